@@ -1,0 +1,233 @@
+//! Candidate correspondences between a stored view and a frame, from the distances of their signatures.
+
+use heapless::Vec;
+
+use crate::extract::Features;
+use crate::kernel::{Kernels, VoteColumns};
+use crate::model::SURPRISE;
+use crate::pyramid::scale;
+
+/// Gains are in 1/64 bit.
+pub const GAIN_UNIT: i32 = 64;
+/// Surprise that gains nothing: every pair of corners is this much alike.
+const FREE_BITS: i32 = 5;
+/// A single corner cannot gain more than this.
+const MOST_BITS: i32 = 12;
+/// Distances up to this have a gain.
+pub const FARTHEST: u8 = farthest();
+/// Neighbours whose distance is within this count as equally near.
+const TIE: u8 = 4;
+
+const fn farthest() -> u8 {
+    let mut distance = 0;
+    while SURPRISE[distance as usize + 1] as i32 > 8 * FREE_BITS {
+        distance += 1;
+    }
+    distance
+}
+
+/// The gain of a distance: `clamp(surprise - 5, 0, 12)` bits, in 1/64 bit.
+#[inline]
+pub fn gain(distance: u8) -> i32 {
+    let surprise = SURPRISE.get(usize::from(distance)).copied().unwrap_or(0);
+    (i32::from(surprise) * (GAIN_UNIT / 8) - FREE_BITS * GAIN_UNIT).clamp(0, MOST_BITS * GAIN_UNIT)
+}
+
+/// `gain / sqrt(n)` for 1, 2 or 3 neighbours that are equally near: a soft ratio test that keeps repeated windows.
+fn shared(gain: i32, n: usize) -> i32 {
+    /// 1 / sqrt(n) in Q16.
+    const ROOT: [i32; 4] = [65_536, 65_536, 46_341, 37_837];
+    (gain * ROOT.get(n).copied().unwrap_or(37_837)) >> 16
+}
+
+/// At most `CANDIDATES` correspondences as columns, the strongest first.
+#[derive(Debug, Clone)]
+pub struct Candidates<const CANDIDATES: usize> {
+    from_x: Vec<f32, CANDIDATES>,
+    from_y: Vec<f32, CANDIDATES>,
+    to_x: Vec<f32, CANDIDATES>,
+    to_y: Vec<f32, CANDIDATES>,
+    step: Vec<f32, CANDIDATES>,
+    gain: Vec<i32, CANDIDATES>,
+    scale: Vec<f32, CANDIDATES>,
+    stored: Vec<u16, CANDIDATES>,
+    order: Vec<u64, CANDIDATES>,
+}
+
+impl<const CANDIDATES: usize> Candidates<CANDIDATES> {
+    /// No candidates.
+    pub const fn new() -> Self {
+        Self {
+            from_x: Vec::new(),
+            from_y: Vec::new(),
+            to_x: Vec::new(),
+            to_y: Vec::new(),
+            step: Vec::new(),
+            gain: Vec::new(),
+            scale: Vec::new(),
+            stored: Vec::new(),
+            order: Vec::new(),
+        }
+    }
+
+    /// How many candidates.
+    pub fn len(&self) -> usize {
+        self.gain.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.gain.is_empty()
+    }
+
+    /// The candidates as columns.
+    pub fn view(&self) -> CandidateView<'_> {
+        CandidateView {
+            votes: VoteColumns {
+                from_x: &self.from_x,
+                from_y: &self.from_y,
+                to_x: &self.to_x,
+                to_y: &self.to_y,
+                step: &self.step,
+                gain: &self.gain,
+            },
+            scale: &self.scale,
+            stored: &self.stored,
+        }
+    }
+
+    /// Collects the three nearest query corners of every stored corner and keeps the `CANDIDATES` of most gain.
+    ///
+    /// `distances` holds a row of `query.len()` distances for each stored corner. Ties: stored corner, then query
+    /// corner, in their order.
+    pub fn collect<K: Kernels>(&mut self, kernels: &K, stored: Features<'_>, query: Features<'_>, distances: &[u8]) {
+        self.order.clear();
+        for (number, row) in distances.chunks_exact(query.len().max(1)).take(stored.len()).enumerate() {
+            let nearest = kernels.nearest_three(row, FARTHEST + TIE);
+            for (&distance, &place) in nearest.distances.iter().zip(&nearest.places) {
+                if distance > FARTHEST {
+                    break;
+                }
+                let equals = nearest.distances.iter().filter(|&&other| other <= distance + TIE).count();
+                let gain = shared(gain(distance), equals);
+                keep_largest(&mut self.order, key(gain, number as u16, place));
+            }
+        }
+        sort_heap(&mut self.order);
+        self.fill_columns(stored, query);
+    }
+
+    fn fill_columns(&mut self, stored: Features<'_>, query: Features<'_>) {
+        self.from_x.clear();
+        self.from_y.clear();
+        self.to_x.clear();
+        self.to_y.clear();
+        self.step.clear();
+        self.gain.clear();
+        self.scale.clear();
+        self.stored.clear();
+        for &key in &self.order {
+            let (gain, from_number, to_number) = parts(key);
+            let (Some(from), Some(to)) = (stored.get(usize::from(from_number)), query.get(usize::from(to_number)))
+            else {
+                continue;
+            };
+            let ([from_x, from_y], [to_x, to_y]) = (from.position.to_pixels(), to.position.to_pixels());
+            // All columns have the capacity of `order`, which these come from.
+            let _ = self.from_x.push(from_x);
+            let _ = self.from_y.push(from_y);
+            let _ = self.to_x.push(to_x);
+            let _ = self.to_y.push(to_y);
+            let _ = self.step.push(f32::from(to.level) - f32::from(from.level));
+            let _ = self.gain.push(gain);
+            let _ = self.scale.push(scale(to.level) / scale(from.level));
+            let _ = self.stored.push(from_number);
+        }
+    }
+}
+
+impl<const CANDIDATES: usize> Default for Candidates<CANDIDATES> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// Candidates as columns of equal length, the strongest first.
+#[derive(Debug, Clone, Copy)]
+pub struct CandidateView<'a> {
+    /// What hypotheses are voted with.
+    pub votes: VoteColumns<'a>,
+    /// Scale of frame over view, from the two levels.
+    pub scale: &'a [f32],
+    /// Number of the stored corner.
+    pub stored: &'a [u16],
+}
+
+/// Larger is better: gain, then the lower stored number, then the lower query number.
+fn key(gain: i32, stored: u16, query: u16) -> u64 {
+    (gain as u64) << 32 | u64::from(!stored) << 16 | u64::from(!query)
+}
+
+fn parts(key: u64) -> (i32, u16, u16) {
+    ((key >> 32) as i32, !((key >> 16) as u16), !(key as u16))
+}
+
+/// A heap with the smallest key on top, which the next larger one replaces when the heap is full.
+fn keep_largest<const N: usize>(heap: &mut Vec<u64, N>, key: u64) {
+    if heap.push(key).is_ok() {
+        let mut child = heap.len() - 1;
+        while child > 0 {
+            let parent = (child - 1) / 2;
+            if !swap_if(heap, parent, child, |parent, child| parent > child) {
+                break;
+            }
+            child = parent;
+        }
+    } else if let Some(top) = heap.first_mut()
+        && *top < key
+    {
+        *top = key;
+        let end = heap.len();
+        sift_down(heap, end);
+    }
+}
+
+/// Restores the heap below its top within the first `end` elements.
+fn sift_down(heap: &mut [u64], end: usize) {
+    let mut parent = 0;
+    loop {
+        let (left, right) = (2 * parent + 1, 2 * parent + 2);
+        let at = |i: usize| if i < end { heap.get(i).copied() } else { None };
+        let child = match (at(left), at(right)) {
+            (Some(l), Some(r)) if r < l => right,
+            (Some(_), _) => left,
+            (None, _) => return,
+        };
+        if !swap_if(heap, parent, child, |parent, child| parent > child) {
+            return;
+        }
+        parent = child;
+    }
+}
+
+/// Turns the heap into a list, largest first.
+fn sort_heap(heap: &mut [u64]) {
+    for end in (1..heap.len()).rev() {
+        swap_if(heap, 0, end, |_, _| true);
+        sift_down(heap, end);
+    }
+}
+
+fn swap_if(heap: &mut [u64], a: usize, b: usize, wanted: impl Fn(u64, u64) -> bool) -> bool {
+    let (Some(&at_a), Some(&at_b)) = (heap.get(a), heap.get(b)) else { return false };
+    if !wanted(at_a, at_b) {
+        return false;
+    }
+    if let Some(slot) = heap.get_mut(a) {
+        *slot = at_b;
+    }
+    if let Some(slot) = heap.get_mut(b) {
+        *slot = at_a;
+    }
+    true
+}

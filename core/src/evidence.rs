@@ -1,0 +1,129 @@
+//! How much a map is worth: evidence in bits that the frame shows the stored view, corner by corner.
+
+use heapless::Vec;
+
+use crate::math::log2_q8;
+use crate::model::{EVIDENCE, SURPRISE};
+use crate::pyramid::scale;
+use crate::refine::{Pairing, Refined, fitting_levels};
+
+/// Evidence is in 1/160 bit: 1/8 bit of the table times a level weight in twentieths.
+pub const EVIDENCE_UNIT: i32 = 160;
+/// Weight of a stored corner's level, in twentieths: coarse patches overlap and are not independent.
+const LEVEL_WEIGHT: [i32; 5] = [20, 20, 14, 10, 7];
+/// A corner that should be seen, and nothing is: -0.3 bit.
+const MISSING: i32 = -48;
+/// A corner is looked for within this, in pixels.
+pub const RADIUS: f32 = 10.0;
+/// Cells of the stored view along each side of a square over its longer side.
+const CELLS: usize = 6;
+/// Evidence of a cell beyond this counts three tenths: 12 bits.
+const CELL_FULL: i32 = 12 * EVIDENCE_UNIT;
+
+/// What one stored corner said.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct CornerEvidence {
+    /// Number of the stored corner.
+    pub stored: u16,
+    /// Number of the query corner that matched; `None` where a corner was expected and nothing found.
+    pub query: Option<u16>,
+    /// Evidence in 1/160 bit; negative if the corner speaks against the view.
+    pub evidence: i32,
+}
+
+/// Adds up the evidence for a map. `corners` receives every stored corner that had something to say.
+///
+/// For a stored corner that maps into the frame, of the `m` query corners within 10 px and one level the nearest
+/// signature (distance `d`) counts: `a = surprise(d) - log2 m` and `b = log2(n / (1 + rank)) - log2 m`, where `rank`
+/// of the frame's `n` corners elsewhere are nearer than `d`. The rank devalues windows that match everywhere. The
+/// table [`EVIDENCE`] turns `a` and `b` into bits. A query corner supports one stored corner only. The sum over each
+/// of 6 x 6 cells of the view saturates, so that one sign or tree cannot carry the answer.
+pub fn weigh<const QUERY: usize, const CORNERS: usize>(
+    pairing: &Pairing<'_, QUERY>,
+    refined: &Refined,
+    corners: &mut Vec<CornerEvidence, CORNERS>,
+) -> i32 {
+    corners.clear();
+    let fitting = fitting_levels(refined.scale);
+    let (width, height) = (f32::from(pairing.query.width), f32::from(pairing.query.height));
+    let count_bits = log2_q8(pairing.query.len() as u32);
+    for (number, (position, &level)) in pairing.stored.positions.iter().zip(pairing.stored.levels).enumerate() {
+        let [x, y] = refined.frame_from_view.apply(position.to_pixels());
+        if !(x >= 0.0 && y >= 0.0 && x < width && y < height) {
+            continue;
+        }
+        let stored = number as u16;
+        let row = pairing.row(number);
+        let levels = fitting.get(usize::from(level)).copied().unwrap_or(0);
+        let (mut near, mut best) = (0_u32, (u8::MAX, u16::MAX));
+        pairing.index.within([x, y], RADIUS, |query, level, _| {
+            if levels >> level & 1 == 1 {
+                near += 1;
+                let distance = row.get(usize::from(query)).copied().unwrap_or(u8::MAX);
+                best = best.min((distance, query));
+            }
+        });
+        if near == 0 {
+            if is_expected(scale(level) * refined.scale) {
+                let _ = corners.push(CornerEvidence { stored, query: None, evidence: MISSING });
+            }
+            continue;
+        }
+        let (distance, query) = best;
+        let near_bits = log2_q8(near);
+        let rank_bits = log2_q8(1 + rank(pairing, row, distance, query));
+        let surprise = i32::from(SURPRISE.get(usize::from(distance)).copied().unwrap_or(0)) * 32;
+        let a = ((surprise - near_bits) >> 8).clamp(0, 15) as usize;
+        let b = ((count_bits - rank_bits - near_bits) >> 8).clamp(0, 9) as usize;
+        let eighths = EVIDENCE.get(a).and_then(|row| row.get(b)).map_or(0, |&e| i32::from(e));
+        let evidence = eighths * LEVEL_WEIGHT.get(usize::from(level)).copied().unwrap_or(0);
+        enter(corners, CornerEvidence { stored, query: Some(query), evidence });
+    }
+    sum_by_cell(pairing, corners)
+}
+
+/// Corners of the frame that are nearer in signature and lie elsewhere: farther than the radius from the match.
+fn rank<const QUERY: usize>(pairing: &Pairing<'_, QUERY>, row: &[u8], distance: u8, query: u16) -> u32 {
+    let nearer = row.iter().filter(|&&other| other < distance).count() as u32;
+    let Some(place) = pairing.query.positions.get(usize::from(query)) else { return nearer };
+    let mut here = 0;
+    pairing.index.within(place.to_pixels(), RADIUS, |other, _, _| {
+        here += u32::from(row.get(usize::from(other)).is_some_and(|&other| other < distance));
+    });
+    nearer.saturating_sub(here)
+}
+
+/// Whether a corner whose patch appears at this scale would be detected on some level: within 0.6 of a level.
+fn is_expected(apparent_scale: f32) -> bool {
+    // 1.41^-0.6 and 1.41^4.6.
+    (0.8137..=4.857).contains(&apparent_scale)
+}
+
+/// Adds a corner; if its query corner supports another already, the weaker of the two says nothing in favour.
+fn enter<const CORNERS: usize>(corners: &mut Vec<CornerEvidence, CORNERS>, mut new: CornerEvidence) {
+    if let Some(owner) = corners.iter_mut().find(|owner| owner.query == new.query) {
+        if new.evidence <= owner.evidence {
+            new.evidence = new.evidence.min(0);
+            new.query = None;
+        } else {
+            owner.evidence = 0;
+            owner.query = None;
+        }
+    }
+    // As many as the view has corners.
+    let _ = corners.push(new);
+}
+
+fn sum_by_cell<const QUERY: usize>(pairing: &Pairing<'_, QUERY>, corners: &[CornerEvidence]) -> i32 {
+    let side = usize::from(pairing.stored.width.max(pairing.stored.height).max(1)) * 16;
+    let mut cells = [[0_i32; CELLS]; CELLS];
+    for corner in corners {
+        let Some(position) = pairing.stored.positions.get(usize::from(corner.stored)) else { continue };
+        let cell = |p: i32| (p.max(0) as usize * CELLS / side).min(CELLS - 1);
+        if let Some(sum) = cells.get_mut(cell(position.y)).and_then(|row| row.get_mut(cell(position.x))) {
+            *sum += corner.evidence;
+        }
+    }
+    let saturated = |&sum: &i32| if sum > CELL_FULL { CELL_FULL + (sum - CELL_FULL) * 3 / 10 } else { sum };
+    cells.iter().flatten().map(saturated).sum()
+}

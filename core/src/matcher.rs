@@ -1,0 +1,98 @@
+//! One stored view against one frame.
+
+use heapless::Vec;
+
+use crate::candidate::Candidates;
+use crate::evidence::{CornerEvidence, weigh};
+use crate::extract::Features;
+use crate::hypothesis::{Hypotheses, HypothesisSource, SignatureVotes};
+use crate::kernel::Kernels;
+use crate::query::QueryIndex;
+use crate::refine::{Pairing, refine};
+use crate::transform::{Homography, WeightedPair};
+
+/// Fewer candidates than this propose nothing.
+const LEAST_CANDIDATES: usize = 3;
+
+/// How well a stored view fits a frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ViewMatch {
+    /// Evidence for the view, in 1/160 bit.
+    pub evidence: i32,
+    /// Where the view lies in the frame.
+    pub frame_from_view: Homography,
+    /// Stored corners with evidence in favour.
+    pub supporting_corners: u16,
+}
+
+/// Working memory for views of at most `STORED` corners.
+#[derive(Debug, Clone)]
+pub struct Matcher<const STORED: usize, const CANDIDATES: usize> {
+    candidates: Candidates<CANDIDATES>,
+    votes: SignatureVotes<CANDIDATES>,
+    pairs: Vec<WeightedPair, CANDIDATES>,
+    corners: Vec<CornerEvidence, STORED>,
+    best_corners: Vec<CornerEvidence, STORED>,
+}
+
+impl<const STORED: usize, const CANDIDATES: usize> Matcher<STORED, CANDIDATES> {
+    /// Working memory; nothing depends on what was matched before.
+    pub const fn new() -> Self {
+        const { assert!(CANDIDATES >= STORED, "every stored corner may become a pair") };
+        Self {
+            candidates: Candidates::new(),
+            votes: SignatureVotes::new(),
+            pairs: Vec::new(),
+            corners: Vec::new(),
+            best_corners: Vec::new(),
+        }
+    }
+
+    /// The best map of the stored view to the frame and its evidence; `None` if no hypothesis stands.
+    ///
+    /// `distances` is scratch memory of at least `stored.len() * query.len()` bytes; with less, the last stored corners
+    /// are left out.
+    pub fn match_view<K: Kernels, const QUERY: usize>(
+        &mut self,
+        kernels: &K,
+        stored: Features<'_>,
+        query: Features<'_>,
+        index: &QueryIndex<QUERY>,
+        distances: &mut [u8],
+    ) -> Option<ViewMatch> {
+        self.best_corners.clear();
+        for (row, &signature) in distances.chunks_exact_mut(query.len().max(1)).zip(stored.signatures) {
+            kernels.distances(signature, query.signatures, row);
+        }
+        self.candidates.collect(kernels, stored, query, distances);
+        if self.candidates.len() < LEAST_CANDIDATES {
+            return None;
+        }
+        let mut hypotheses = Hypotheses::new();
+        let view_size = [f32::from(stored.width), f32::from(stored.height)];
+        self.votes.propose(kernels, self.candidates.view(), view_size, &mut hypotheses);
+        let pairing = Pairing { stored, query, index, distances };
+        let mut best: Option<ViewMatch> = None;
+        for hypothesis in hypotheses.iter() {
+            let Some(refined) = refine(&pairing, self.candidates.view(), hypothesis, &mut self.pairs) else { continue };
+            let evidence = weigh(&pairing, &refined, &mut self.corners);
+            if best.is_none_or(|best| evidence > best.evidence) {
+                let supporting_corners = self.corners.iter().filter(|corner| corner.evidence > 0).count() as u16;
+                best = Some(ViewMatch { evidence, frame_from_view: refined.frame_from_view, supporting_corners });
+                core::mem::swap(&mut self.corners, &mut self.best_corners);
+            }
+        }
+        best
+    }
+
+    /// The corners behind the latest match, for an explanation.
+    pub fn corners(&self) -> &[CornerEvidence] {
+        &self.best_corners
+    }
+}
+
+impl<const STORED: usize, const CANDIDATES: usize> Default for Matcher<STORED, CANDIDATES> {
+    fn default() -> Self {
+        Self::new()
+    }
+}

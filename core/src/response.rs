@@ -1,0 +1,104 @@
+//! The Harris response, row by row as the image arrives.
+//!
+//! Integer gradients and structure tensor; three pixel rows are looked at and a few rows of the tensor kept, so the
+//! memory depends on the width of a strip, not on the image.
+
+use crate::kernel::Kernels;
+
+/// Rows of the tensor that one row of the response is smoothed from.
+const TENSOR_ROWS: usize = 5;
+/// Rows of the response that the suppression of non-maxima looks at: 3 above and 3 below.
+pub(crate) const RESPONSE_ROWS: usize = 7;
+/// Columns of the products beyond those of the response.
+const HALO: usize = 4;
+/// Pixels that a response looks at in each direction: 1 for the gradient, 2 for the smoothing.
+pub(crate) const REACH: usize = 3;
+
+/// Rolling rows of tensor and response for a strip of at most `STRIP - 4` columns.
+///
+/// [`ResponseRows::BYTES`] of memory, whatever the height of the image.
+#[derive(Debug, Clone)]
+pub struct ResponseRows<const STRIP: usize> {
+    products: [[i32; STRIP]; 3],
+    tensor: [[[i32; STRIP]; 3]; TENSOR_ROWS],
+    response: [[f32; STRIP]; RESPONSE_ROWS],
+    /// Columns of the response in the present strip.
+    columns: usize,
+    /// Rows of the tensor since [`ResponseRows::start`].
+    pushed: usize,
+}
+
+impl<const STRIP: usize> ResponseRows<STRIP> {
+    /// Bytes that the rolling rows take.
+    pub const BYTES: usize = size_of::<Self>();
+
+    /// The widest strip of responses that fits.
+    pub const MAX_COLUMNS: usize = STRIP - HALO;
+
+    /// Rolling rows without an image yet.
+    pub const fn new() -> Self {
+        Self {
+            products: [[0; STRIP]; 3],
+            tensor: [[[0; STRIP]; 3]; TENSOR_ROWS],
+            response: [[0.0; STRIP]; RESPONSE_ROWS],
+            columns: 0,
+            pushed: 0,
+        }
+    }
+
+    /// Begins a strip whose response has `columns` columns, at most [`ResponseRows::MAX_COLUMNS`].
+    pub fn start(&mut self, columns: usize) {
+        self.columns = columns.min(Self::MAX_COLUMNS);
+        self.pushed = 0;
+    }
+
+    /// Takes the next image row, given with its neighbours above and below: `columns + 6` pixels each, beginning
+    /// three columns before the strip. Returns whether a row of the response became complete; it belongs to the image
+    /// row two above the middle one.
+    pub fn push<K: Kernels>(&mut self, kernels: &K, rows: [&[u8]; 3]) -> bool {
+        let n = self.columns;
+        let slot = self.pushed % TENSOR_ROWS;
+        if let Some(tensor) = self.tensor.get_mut(slot) {
+            let products = self.products.each_mut().map(|part| part.get_mut(..n + HALO).unwrap_or_default());
+            let out = tensor.each_mut().map(|part| part.get_mut(..n).unwrap_or_default());
+            kernels.structure_row(rows, products, out);
+        }
+        self.pushed += 1;
+        if self.pushed < TENSOR_ROWS {
+            return false;
+        }
+        let number = self.pushed - TENSOR_ROWS;
+        // Oldest tensor row first.
+        let mut five: [[&[i32]; 3]; TENSOR_ROWS] = [[&[]; 3]; TENSOR_ROWS];
+        for (age, row) in five.iter_mut().enumerate() {
+            if let Some(tensor) = self.tensor.get((number + age) % TENSOR_ROWS) {
+                *row = tensor.each_ref().map(|part| part.get(..n).unwrap_or(&[]));
+            }
+        }
+        if let Some(out) = self.response.get_mut(number % RESPONSE_ROWS).and_then(|row| row.get_mut(..n)) {
+            kernels.response_row(five, out);
+        }
+        true
+    }
+
+    /// Rows of the response that are complete.
+    pub const fn complete(&self) -> usize {
+        self.pushed.saturating_sub(TENSOR_ROWS - 1)
+    }
+
+    /// The latest seven rows of the response, oldest first; `None` until seven are complete.
+    pub(crate) fn neighbourhood(&self) -> Option<[&[f32]; RESPONSE_ROWS]> {
+        let first = self.complete().checked_sub(RESPONSE_ROWS)?;
+        let mut rows: [&[f32]; RESPONSE_ROWS] = [&[]; RESPONSE_ROWS];
+        for (age, row) in rows.iter_mut().enumerate() {
+            *row = self.response.get((first + age) % RESPONSE_ROWS)?.get(..self.columns)?;
+        }
+        Some(rows)
+    }
+}
+
+impl<const STRIP: usize> Default for ResponseRows<STRIP> {
+    fn default() -> Self {
+        Self::new()
+    }
+}

@@ -1,0 +1,133 @@
+//! Core's recognizer with the memory of a PC and the kernels of this processor.
+
+use daymark_core::evidence::CornerEvidence;
+use daymark_core::extract::{Extractor, FeatureSet, Features, FrontEnd};
+use daymark_core::image::FrameError;
+use daymark_core::matcher::ViewMatch;
+use daymark_core::profile::Profile;
+use daymark_core::pyramid::level_bytes;
+use daymark_core::recognizer::Recognizer;
+use daymark_core::table::{StoredView, ViewSource};
+use daymark_core::verdict::{FalseAnswer, Recognition};
+
+use crate::enroll::select::Selection;
+use crate::picture::GrayImage;
+use crate::simd::Processor;
+use crate::with_kernels;
+
+/// Longer side to which pictures and frames are shrunk, in pixels.
+pub const FRAME_SIDE: usize = 640;
+
+/// How a profile reads frames and pictures.
+pub const fn selection(profile: Profile) -> Selection {
+    let query = FrontEnd { features: 800, cell_share_tenths: 12 };
+    match profile {
+        Profile::Board => Selection {
+            candidates: FrontEnd { features: 1_600, cell_share_tenths: 25 },
+            query,
+            keep: profile.corners_per_view(),
+        },
+        _ => Selection {
+            candidates: FrontEnd { features: 800, cell_share_tenths: 25 },
+            query,
+            keep: profile.corners_per_view(),
+        },
+    }
+}
+
+/// Features of a frame, at most.
+pub const QUERY_FEATURES: usize = 800;
+const STRIP: usize = 256;
+const SLOTS: usize = selection(Profile::Handheld).query.slots();
+
+type HandheldRecognizer = Recognizer<100, 200, QUERY_FEATURES>;
+type BoardRecognizer = Recognizer<800, 800, QUERY_FEATURES>;
+
+#[derive(Debug)]
+enum AnyRecognizer {
+    Handheld(Box<HandheldRecognizer>),
+    Board(Box<BoardRecognizer>),
+}
+
+/// Everything that recognizing frames needs, allocated once.
+#[derive(Debug)]
+pub struct Engine {
+    processor: Processor,
+    profile: Profile,
+    extractor: Box<Extractor<STRIP, SLOTS>>,
+    features: Box<FeatureSet<QUERY_FEATURES>>,
+    levels: Vec<u8>,
+    recognizer: AnyRecognizer,
+    distances: Vec<u8>,
+    record: Vec<u8>,
+}
+
+impl Engine {
+    /// An engine for tables of this profile, with the fastest kernels of this processor.
+    pub fn new(profile: Profile) -> Self {
+        Self::with_processor(profile, Processor::detect())
+    }
+
+    /// An engine with chosen kernels; the results are the same.
+    pub fn with_processor(profile: Profile, processor: Processor) -> Self {
+        let (recognizer, distances) = match profile {
+            Profile::Board => (AnyRecognizer::Board(Box::default()), BoardRecognizer::DISTANCE_BYTES),
+            _ => (AnyRecognizer::Handheld(Box::default()), HandheldRecognizer::DISTANCE_BYTES),
+        };
+        Self {
+            processor,
+            profile,
+            extractor: Box::default(),
+            features: Box::default(),
+            levels: Vec::new(),
+            recognizer,
+            distances: vec![0; distances],
+            record: Vec::new(),
+        }
+    }
+
+    /// The kernels in use.
+    pub const fn processor(&self) -> Processor {
+        self.processor
+    }
+
+    /// Reads the features of a frame, which later calls refer to.
+    ///
+    /// # Errors
+    /// [`FrameError`] for a frame beyond core's limits.
+    pub fn extract(&mut self, frame: &GrayImage) -> Result<(), FrameError> {
+        self.levels.resize(level_bytes(frame.width, frame.height), 0);
+        let front_end = selection(self.profile).query;
+        let view = frame.view()?;
+        with_kernels!(self.processor, kernels => {
+            self.extractor.extract(kernels, view, front_end, &mut self.levels, &mut self.features)
+        })
+    }
+
+    /// The features of the latest frame.
+    pub fn features(&self) -> Features<'_> {
+        self.features.view()
+    }
+
+    /// Compares the latest frame with every view of a table.
+    ///
+    /// # Errors
+    /// What the table's source says.
+    pub fn recognize<S: ViewSource>(&mut self, table: &mut S, limit: FalseAnswer) -> Result<Recognition, S::Error> {
+        self.record.resize(table.buffer_bytes(), 0);
+        let (frame, distances, record) = (self.features.view(), &mut self.distances, &mut self.record);
+        with_kernels!(self.processor, kernels => match &mut self.recognizer {
+            AnyRecognizer::Handheld(recognizer) => recognizer.recognize(kernels, frame, table, distances, record, limit),
+            AnyRecognizer::Board(recognizer) => recognizer.recognize(kernels, frame, table, distances, record, limit),
+        })
+    }
+
+    /// Matches one view with the latest frame and tells what each stored corner said.
+    pub fn explain(&mut self, view: &StoredView<'_>) -> Option<(ViewMatch, &[CornerEvidence])> {
+        let (frame, distances) = (self.features.view(), &mut self.distances);
+        with_kernels!(self.processor, kernels => match &mut self.recognizer {
+            AnyRecognizer::Handheld(recognizer) => recognizer.explain(kernels, frame, view, distances),
+            AnyRecognizer::Board(recognizer) => recognizer.explain(kernels, frame, view, distances),
+        })
+    }
+}

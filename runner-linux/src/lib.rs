@@ -1,0 +1,7 @@
+//! Everything around daymark's core that has an operating system.
+
+pub mod engine;
+pub mod enroll;
+pub mod picture;
+pub mod simd;
+pub mod table_file;

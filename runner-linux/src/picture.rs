@@ -1,0 +1,240 @@
+//! Image files as gray frames: upright, longer side at most a given number of pixels, with the same bytes everywhere.
+
+use std::fmt;
+use std::fs::File;
+use std::io::{BufReader, Cursor, Read};
+use std::path::{Path, PathBuf};
+
+use daymark_core::image::{FrameError, GrayView};
+use image::metadata::Orientation;
+use image::{DynamicImage, ImageDecoder, ImageError, ImageReader, Limits};
+
+/// Pixels of a picture, at most: larger ones are refused before they are decoded.
+pub const MAX_PIXELS: u64 = 200_000_000;
+/// Memory that decoding may take, in bytes.
+const MAX_DECODE_BYTES: u64 = 1 << 30;
+/// A picture whose longer side is shorter has no place for corners.
+pub const MIN_SIDE: u32 = 64;
+
+/// A gray image that owns its pixels, rows packed.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct GrayImage {
+    /// Row after row, 0 black to 255 white.
+    pub pixels: Vec<u8>,
+    /// Pixels in a row.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+}
+
+impl GrayImage {
+    /// The image as core reads it.
+    ///
+    /// # Errors
+    /// [`FrameError`] if a side is 0 or too long.
+    pub fn view(&self) -> Result<GrayView<'_>, FrameError> {
+        GrayView::new(&self.pixels, self.width, self.height, self.width)
+    }
+
+    /// Shrinks by exact area averages so that the longer side is `side`; a smaller image stays as it is.
+    pub fn shrunk_to(self, side: usize) -> Self {
+        let longer = self.width.max(self.height);
+        if longer <= side {
+            return self;
+        }
+        let scaled = |length: usize| ((length * side * 2 + longer) / (2 * longer)).max(1);
+        let (width, height) = (scaled(self.width), scaled(self.height));
+        area_average(&self, width, height)
+    }
+}
+
+/// The weights of a box average along one axis: for each output the first input and the weights from there, of which
+/// each sums up to the input's length. Lengths are integers, so that the average is exact.
+fn box_weights(input: usize, output: usize) -> Vec<(usize, Vec<u32>)> {
+    // In units of 1 / output px an input pixel is `output` long and an output pixel `input`.
+    (0..output)
+        .map(|i| {
+            let (start, end) = (i * input, (i + 1) * input);
+            let first = start / output;
+            let last = end.div_ceil(output);
+            let weight = |p: usize| ((p + 1) * output).min(end) - (p * output).max(start);
+            (first, (first..last).map(|p| weight(p) as u32).collect())
+        })
+        .collect()
+}
+
+fn area_average(image: &GrayImage, width: usize, height: usize) -> GrayImage {
+    let columns = box_weights(image.width, width);
+    let rows = box_weights(image.height, height);
+    let total = (image.width * image.height) as u64;
+    let mut pixels = Vec::with_capacity(width * height);
+    let mut sums = vec![0_u64; image.width];
+    for (first, weights) in rows {
+        sums.fill(0);
+        for (row, weight) in image.pixels.chunks_exact(image.width).skip(first).zip(weights) {
+            for (sum, &pixel) in sums.iter_mut().zip(row) {
+                *sum += u64::from(pixel) * u64::from(weight);
+            }
+        }
+        pixels.extend(columns.iter().map(|(first, weights)| {
+            let sum: u64 = sums[*first..].iter().zip(weights).map(|(&sum, &weight)| sum * u64::from(weight)).sum();
+            ((sum + total / 2) / total) as u8
+        }));
+    }
+    GrayImage { pixels, width, height }
+}
+
+/// Reads a picture: turned upright by its EXIF orientation, gray by the Rec. 601 luma, transparent parts over black.
+///
+/// # Errors
+/// [`PictureError`], which names the file and what to do.
+pub fn read_gray(path: &Path) -> Result<GrayImage, PictureError> {
+    let fail = |reason| PictureError { path: path.to_owned(), reason };
+    let io = |error: std::io::Error| fail(Reason::Io(error.to_string()));
+    let mut bytes = Vec::new();
+    let metadata = std::fs::metadata(path).map_err(io)?;
+    if metadata.is_dir() {
+        return Err(fail(Reason::Folder));
+    }
+    BufReader::new(File::open(path).map_err(io)?).read_to_end(&mut bytes).map_err(io)?;
+    gray_from_bytes(&bytes).map_err(fail)
+}
+
+fn gray_from_bytes(bytes: &[u8]) -> Result<GrayImage, Reason> {
+    if bytes.is_empty() {
+        return Err(Reason::Empty);
+    }
+    let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| Reason::Io(e.to_string()))?;
+    if reader.format().is_none() {
+        return Err(Reason::NotAnImage);
+    }
+    let mut decoder = reader.into_decoder().map_err(Reason::of_decoder)?;
+    let mut limits = Limits::default();
+    limits.max_alloc = Some(MAX_DECODE_BYTES);
+    let (width, height) = decoder.dimensions();
+    if u64::from(width) * u64::from(height) > MAX_PIXELS {
+        return Err(Reason::TooLarge { width, height });
+    }
+    if width.max(height) < MIN_SIDE {
+        return Err(Reason::TooSmall { width, height });
+    }
+    decoder.set_limits(limits).map_err(Reason::of_decoder)?;
+    let orientation = decoder.orientation().unwrap_or(Orientation::NoTransforms);
+    let mut image = DynamicImage::from_decoder(decoder).map_err(Reason::of_decoder)?;
+    let mut gray = DynamicImage::ImageLuma8(luma(&mut image));
+    drop(image);
+    gray.apply_orientation(orientation);
+    let gray = gray.into_luma8();
+    let (width, height) = (gray.width() as usize, gray.height() as usize);
+    Ok(GrayImage { pixels: gray.into_raw(), width, height })
+}
+
+/// Rec. 601 luma in integers, as JPEG files and most cameras define gray; alpha multiplies.
+fn luma(image: &mut DynamicImage) -> image::GrayImage {
+    let weigh = |[r, g, b]: [u8; 3]| {
+        ((u32::from(r) * 19_595 + u32::from(g) * 38_470 + u32::from(b) * 7_471 + 32_768) >> 16) as u8
+    };
+    let (width, height) = (image.width(), image.height());
+    let pixels = match image {
+        DynamicImage::ImageLuma8(gray) => return std::mem::take(gray),
+        DynamicImage::ImageRgb8(rgb) => rgb.as_raw().as_chunks::<3>().0.iter().map(|&rgb| weigh(rgb)).collect(),
+        other => {
+            let rgba = other.to_rgba8();
+            let over_black = |&[r, g, b, a]: &[u8; 4]| {
+                let by_alpha = |c: u8| ((u32::from(c) * u32::from(a) + 127) / 255) as u8;
+                weigh([by_alpha(r), by_alpha(g), by_alpha(b)])
+            };
+            rgba.as_raw().as_chunks::<4>().0.iter().map(over_black).collect()
+        }
+    };
+    image::GrayImage::from_raw(width, height, pixels).unwrap_or_default()
+}
+
+/// A picture that cannot be used. Nothing was changed.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct PictureError {
+    /// The file.
+    pub path: PathBuf,
+    /// Why.
+    pub reason: Reason,
+}
+
+/// Why a picture cannot be used.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Reason {
+    /// The system refused to read it.
+    Io(String),
+    /// It is a folder.
+    Folder,
+    /// It has no bytes.
+    Empty,
+    /// Its first bytes are those of no image format that is read here.
+    NotAnImage,
+    /// It is damaged, cut off, or of a kind within its format that is not read here.
+    Damaged(String),
+    /// It has too many pixels.
+    TooLarge {
+        /// Width in pixels.
+        width: u32,
+        /// Height in pixels.
+        height: u32,
+    },
+    /// It has too few pixels.
+    TooSmall {
+        /// Width in pixels.
+        width: u32,
+        /// Height in pixels.
+        height: u32,
+    },
+}
+
+impl Reason {
+    fn of_decoder(error: ImageError) -> Self {
+        match error {
+            ImageError::IoError(error) => Self::Damaged(format!("it ends too early ({error})")),
+            error => Self::Damaged(error.to_string()),
+        }
+    }
+}
+
+impl fmt::Display for PictureError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let path = self.path.display();
+        match &self.reason {
+            Reason::Io(error) => write!(f, "cannot read the picture {path}: {error}"),
+            Reason::Folder => write!(f, "{path} is a folder, not a picture; name the pictures in it"),
+            Reason::Empty => write!(f, "the picture {path} has zero bytes; copy or take it again"),
+            Reason::NotAnImage => {
+                write!(f, "{path} is not a picture that can be read here; use JPEG, PNG, WebP, TIFF, BMP or PNM")
+            }
+            Reason::Damaged(error) => {
+                write!(f, "the picture {path} is damaged or of an unusual kind: {error}; save it again as JPEG or PNG")
+            }
+            Reason::TooLarge { width, height } => write!(
+                f,
+                "the picture {path} has {width} x {height} pixels, more than {MAX_PIXELS} in all; scale it down"
+            ),
+            Reason::TooSmall { width, height } => write!(
+                f,
+                "the picture {path} has only {width} x {height} pixels; its longer side must have at least {MIN_SIDE}"
+            ),
+        }
+    }
+}
+
+impl std::error::Error for PictureError {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn area_average_is_exact() {
+        let image = GrayImage { pixels: vec![0, 90, 30, 30, 60, 255], width: 3, height: 2 };
+        // One output column covers 1.5 inputs: (0 + 45) / 1.5 = 30 in the upper row.
+        assert_eq!(area_average(&image, 2, 2).pixels, [30, 50, 40, 190]);
+        assert_eq!(area_average(&image, 1, 1).pixels, [78]);
+        assert_eq!(image.clone().shrunk_to(3), image);
+    }
+}

@@ -1,0 +1,141 @@
+//! The inner loops of core, compiled again for the vector instructions that this processor turns out to have.
+//!
+//! Nothing is written twice: each function below *is* the loop of [`daymark_core::kernel`], inlined into a function
+//! with a target feature. A test compares all of them with the portable ones, bit for bit.
+
+#![allow(unsafe_code, reason = "calling a function with a target feature, after asking the processor for it")]
+
+use daymark_core::feature::Signature;
+use daymark_core::kernel::{self, BoxSums, Kernels, Nearest, Patch, Seed, VoteColumns};
+
+/// The kernels of one processor.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Processor {
+    /// Any processor.
+    Portable,
+    /// x86-64 with AVX2.
+    #[cfg(target_arch = "x86_64")]
+    Avx2(Avx2),
+    /// x86-64 with AVX-512 (F, BW, DQ, VL, VPOPCNTDQ).
+    #[cfg(target_arch = "x86_64")]
+    Avx512(Avx512),
+}
+
+impl Processor {
+    /// The fastest kernels that run here. `DAYMARK_KERNELS=portable` or `avx2` asks for less, to compare.
+    pub fn detect() -> Self {
+        let wanted = std::env::var("DAYMARK_KERNELS").unwrap_or_default();
+        Self::available().into_iter().rev().find(|kernels| wanted.is_empty() || wanted == kernels.name()).unwrap_or(Self::Portable)
+    }
+
+    /// All kernels that run here, the fastest last.
+    pub fn available() -> Vec<Self> {
+        #[allow(unused_mut, reason = "other processors have the portable kernels only")]
+        let mut available = vec![Self::Portable];
+        #[cfg(target_arch = "x86_64")]
+        {
+            available.extend(Avx2::detect().map(Self::Avx2));
+            available.extend(Avx512::detect().map(Self::Avx512));
+        }
+        available
+    }
+
+    /// A short name.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Portable => "portable",
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2(_) => "avx2",
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512(_) => "avx512",
+        }
+    }
+}
+
+/// Implements [`Kernels`] for `$name` by calling core's loops in functions with `$features`.
+#[cfg(target_arch = "x86_64")]
+macro_rules! kernels {
+    ($(#[$doc:meta])* $name:ident, $features:literal, [$($feature:tt),+]; $($function:ident($($argument:ident: $kind:ty),*) $(-> $result:ty)?;)+) => {
+        $(#[$doc])*
+        #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+        pub struct $name(());
+
+        impl $name {
+            /// The kernels, if this processor has what they need.
+            pub fn detect() -> Option<Self> {
+                ($(std::is_x86_feature_detected!($feature))&&+).then_some(Self(()))
+            }
+        }
+
+        impl Kernels for $name {
+            $(
+                fn $function(&self, $($argument: $kind),*) $(-> $result)? {
+                    #[target_feature(enable = $features)]
+                    fn widened($($argument: $kind),*) $(-> $result)? {
+                        kernel::$function($($argument),*)
+                    }
+                    // SAFETY: a value of this type exists only if `detect` found all of these features.
+                    unsafe { widened($($argument),*) }
+                }
+            )+
+        }
+    };
+}
+
+#[cfg(target_arch = "x86_64")]
+macro_rules! all_kernels {
+    ($(#[$doc:meta])* $name:ident, $features:literal, $list:tt) => {
+        kernels! {
+            $(#[$doc])* $name, $features, $list;
+            shrink_seven_to_five(rows: [&[u8]; 3], weights: [u16; 3], out: &mut [u8]);
+            halve(upper: &[u8], lower: &[u8], out: &mut [u8]);
+            structure_row(rows: [&[u8]; 3], products: [&mut [i32]; 3], out: [&mut [i32]; 3]);
+            response_row(rows: [[&[i32]; 3]; 5], out: &mut [f32]);
+            peak_flags(rows: [&[f32]; 3], flags: &mut [u8]);
+            box_sums(patch: &Patch, sums: &mut BoxSums);
+            distances(signature: Signature, others: &[Signature], out: &mut [u8]);
+            count_below(values: &[u8], limit: u8) -> u32;
+            nearest_three(row: &[u8], limit: u8) -> Nearest;
+            votes(seed: Seed, columns: VoteColumns<'_>, agrees: &mut [u8]) -> i32;
+        }
+    };
+}
+
+#[cfg(target_arch = "x86_64")]
+all_kernels!(
+    /// Kernels for AVX2.
+    Avx2,
+    "avx2,popcnt,bmi1,bmi2,lzcnt",
+    ["avx2", "popcnt", "bmi1", "bmi2", "lzcnt"]
+);
+#[cfg(target_arch = "x86_64")]
+all_kernels!(
+    /// Kernels for AVX-512 with a vector population count.
+    Avx512,
+    "avx2,popcnt,bmi1,bmi2,lzcnt,avx512f,avx512bw,avx512dq,avx512vl,avx512vpopcntdq",
+    ["avx2", "popcnt", "bmi1", "bmi2", "lzcnt", "avx512f", "avx512bw", "avx512dq", "avx512vl", "avx512vpopcntdq"]
+);
+
+/// Calls the expression with the kernels of this processor, each as its own type, so that the caller's loops are
+/// compiled for each.
+#[macro_export]
+macro_rules! with_kernels {
+    ($processor:expr, $kernels:ident => $body:expr) => {
+        match $processor {
+            $crate::simd::Processor::Portable => {
+                let $kernels = &daymark_core::kernel::Portable;
+                $body
+            }
+            #[cfg(target_arch = "x86_64")]
+            $crate::simd::Processor::Avx2(kernels) => {
+                let $kernels = &kernels;
+                $body
+            }
+            #[cfg(target_arch = "x86_64")]
+            $crate::simd::Processor::Avx512(kernels) => {
+                let $kernels = &kernels;
+                $body
+            }
+        }
+    };
+}
