@@ -577,9 +577,23 @@ proptest! {
         }
     }
 
+    /// Also under a right checksum, with small numbers as they are in a true header.
     #[test]
-    fn a_header_of_any_bytes_is_read_or_refused(bytes in prop::collection::vec(any::<u8>(), 0..64)) {
-        let _ = outcome(&bytes);
-        let _ = Header::decode(&bytes);
+    fn a_header_of_any_bytes_is_read_or_refused(
+        fields in prop::collection::vec(prop_oneof![2 => Just(0_u8), 1 => 0..4_u8, 1 => any::<u8>()], 30),
+        rest in prop::collection::vec(any::<u8>(), 0..64),
+    ) {
+        prop_assert!(outcome(&rest).is_err());
+        let mut bytes = [b"DAYMARK\x1A\x01\x00", &fields[..], &rest].concat();
+        bytes[10] = 1 + bytes[10] % 2;
+        bytes[11..14].copy_from_slice(&[0, 128, 0]);
+        let bytes = resealed_header(bytes);
+        prop_assert!(outcome(&bytes).is_err(), "the table id is not right");
+        if let Ok(header) = Header::decode(&bytes) {
+            prop_assert!((1..=800).contains(&header.corners_limit()));
+            prop_assert!(header.landmark_count() <= header.view_count() && header.view_count() <= 250_000);
+            let index = 12 * header.landmark_count() + 16 * header.view_count();
+            prop_assert!(header.file_length() >= 40 + index);
+        }
     }
 }

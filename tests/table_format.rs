@@ -328,6 +328,8 @@ fn the_encoder_refuses_what_no_reader_accepts() {
     assert_eq!(small, Err(EncodeError::BufferTooSmall { needed: 23, available: 22 }));
     let none = encode_view(100, 64, 64, &[], &mut buffer);
     assert_eq!(none, fault(RecordFault::CornerCount { found: 0, allowed: 100 }));
+    let too_many = encode_view(1, 640, 480, &grid(2), &mut buffer);
+    assert_eq!(too_many, fault(RecordFault::CornerCount { found: 2, allowed: 1 }));
     assert!(corner_key(&corner(-1, 0, 0, [0; 2])).is_err());
     assert!(corner_key(&corner(0, 16_384, 0, [0; 2])).is_err());
     assert!(corner_key(&corner(0, 0, 5, [0; 2])).is_err());

@@ -1,5 +1,6 @@
 //! Everything around daymark's core that has an operating system.
 
+pub mod command;
 pub mod engine;
 pub mod enroll;
 pub mod picture;
