@@ -24,7 +24,7 @@ impl Raw {
         let view = |corner: u32| view(64, 64, &[corner, corner + 16]);
         Self {
             landmarks: vec![vec![0, 0, 1, b'a'], vec![3, 1, 2, 4, 5, 1, b'b']],
-            views: vec![(0, view(0)), (1, view(0x100)), (1, view(0x200))],
+            views: vec![(0, view(0)), (1, view(0x100)), (1, view(0x180))],
         }
     }
 
@@ -75,9 +75,9 @@ fn view(width: u8, height: u8, corners: &[u32]) -> Vec<u8> {
     record
 }
 
-/// A corner's number.
+/// A corner's number of commonness -1; x and y in 1/8 px.
 fn number(x: u32, y: u32, level: u32) -> u32 {
-    x | y << 14 | level << 28
+    x | y << 13 | level << 26
 }
 
 /// The bytes with the table id and the header's checksum computed anew, as a program would that means what it writes.
@@ -426,20 +426,35 @@ fn a_view_that_was_written_wrong_is_refused() {
 
 #[test]
 fn a_corner_that_cannot_be_is_refused() {
-    // The frame is 64 x 64 px: coordinates are at most 63 * 16 = 1008.
-    let last = number(1008, 1008, 4);
+    // The frame is 64 x 64 px: coordinates are at most 63 * 8 = 504.
+    let last = number(504, 504, 4);
     assert_eq!(view_outcome(view(64, 64, &[0, last])), Ok(5));
-    assert_eq!(view_outcome(view(64, 64, &[0, 1 << 31])), corner_fault(1, CornerFault::ReservedBit));
-    assert_eq!(view_outcome(view(64, 64, &[5 << 28])), corner_fault(0, CornerFault::Level { found: 5 }));
-    assert_eq!(view_outcome(view(64, 64, &[7 << 28])), corner_fault(0, CornerFault::Level { found: 7 }));
-    let outside = |x, y| corner_fault(0, CornerFault::OutsideFrame { x, y });
-    assert_eq!(view_outcome(view(64, 64, &[1009])), outside(1009, 0));
-    assert_eq!(view_outcome(view(64, 64, &[1009 << 14])), outside(0, 1009));
-    assert_eq!(view_outcome(view(64, 63, &[1008 << 14])), outside(0, 1008));
-    for unsorted in [[1, 0], [1 << 14, 9], [1 << 28, number(1008, 1008, 0)], [last, 0]] {
+    for commonness in [0, 7 << 29] {
+        let of = |number| view(64, 64, &[number | commonness]);
+        assert_eq!(view_outcome(of(last)), Ok(5));
+        assert_eq!(view_outcome(of(number(0, 0, 5))), corner_fault(0, CornerFault::Level { found: 5 }));
+        assert_eq!(view_outcome(of(number(0, 0, 7))), corner_fault(0, CornerFault::Level { found: 7 }));
+        // In the error as everywhere outside the table: in 1/16 px.
+        let outside = |x, y| corner_fault(0, CornerFault::OutsideFrame { x, y });
+        assert_eq!(view_outcome(of(number(505, 0, 0))), outside(1010, 0));
+        assert_eq!(view_outcome(of(number(0, 505, 0))), outside(0, 1010));
+        assert_eq!(view_outcome(of(number(8191, 0, 0))), outside(16_382, 0));
+        assert_eq!(view_outcome(view(64, 63, &[number(0, 504, 0) | commonness])), outside(0, 1008));
+    }
+    for unsorted in [[1, 0], [1 << 13, 9], [1 << 26, number(504, 504, 0)], [last, 0]] {
         assert_eq!(view_outcome(view(64, 64, &unsorted)), corner_fault(1, CornerFault::Order), "{unsorted:?}");
     }
     assert_eq!(view_outcome(view(64, 64, &[0, 7, 7])), corner_fault(2, CornerFault::Order));
+}
+
+#[test]
+fn a_corners_commonness_does_not_sort() {
+    for (first, second) in [(0, 0), (0, 7), (7, 0), (3, 4)] {
+        let two = |a: u32, b: u32| view(64, 64, &[a | first << 29, b | second << 29]);
+        assert_eq!(view_outcome(two(number(2, 2, 2), number(3, 2, 2))), Ok(5));
+        assert_eq!(view_outcome(two(number(2, 2, 2), number(2, 2, 2))), corner_fault(1, CornerFault::Order));
+        assert_eq!(view_outcome(two(number(3, 2, 2), number(2, 2, 2))), corner_fault(1, CornerFault::Order));
+    }
 }
 
 #[test]

@@ -1,12 +1,12 @@
 //! The landmark table as `core/FORMAT.md` specifies it: its worked bytes, what they mean, and back.
 
-use daymark_core::feature::{Feature, Signature};
+use daymark_core::feature::{COMMONNESS, Feature, Signature};
 use daymark_core::point::ImagePoint;
 use daymark_core::profile::Profile;
 use daymark_core::table::{
-    CORNER_BYTES, EncodeError, GeoPosition, HEADER_BYTES, Header, Kind, LANDMARK_BYTES, Landmark, LandmarkTable,
-    RecordFault, StoredView, StreamError, TableEncoder, TableError, TableLimit, TableStream, VIEW_HEADER_BYTES,
-    VIEWS_LIMIT, ViewSource, corner_key, corners_limit, encode_landmark, encode_view,
+    CORNER_BYTES, CornerFault, EncodeError, GeoPosition, HEADER_BYTES, Header, Kind, LANDMARK_BYTES, Landmark,
+    LandmarkTable, RecordFault, StoredView, StreamError, TableEncoder, TableError, TableLimit, TableStream,
+    VIEW_HEADER_BYTES, VIEWS_LIMIT, ViewSource, corner_key, corners_limit, encode_landmark, encode_view, on_grid,
 };
 use embedded_io::{ErrorType, Read, Seek, SeekFrom};
 use proptest::prelude::*;
@@ -29,8 +29,8 @@ fn worked_bytes() -> Vec<u8> {
     bytes
 }
 
-fn corner(x: i32, y: i32, level: u8, signature: [u64; 2]) -> Feature {
-    Feature { position: ImagePoint::new(x, y), level, signature: Signature(signature) }
+fn corner(x: i32, y: i32, level: u8, commonness: i8, signature: [u64; 2]) -> Feature {
+    Feature { position: ImagePoint::new(x, y), level, commonness, signature: Signature(signature) }
 }
 
 /// A landmark with its views, each a frame size and sorted corners.
@@ -53,7 +53,10 @@ fn worked_landmarks() -> Vec<Enrolled> {
             views: vec![(
                 640,
                 480,
-                vec![corner(808, 1608, 0, [0x0123_4567_89AB_CDEF, 0xFEDC_BA98_7654_3210]), corner(48, 32, 1, [1, 2])],
+                vec![
+                    corner(810, 1608, 0, 0, [0x0123_4567_89AB_CDEF, 0xFEDC_BA98_7654_3210]),
+                    corner(48, 32, 1, 6, [1, 2]),
+                ],
             )],
         },
         Enrolled {
@@ -61,8 +64,8 @@ fn worked_landmarks() -> Vec<Enrolled> {
             kind: Kind::Lighthouse,
             position: Some(lantern),
             views: vec![
-                (320, 240, vec![corner(5104, 3824, 4, [u64::MAX, 1 << 63])]),
-                (64, 64, vec![corner(0, 0, 0, [0, 0])]),
+                (320, 240, vec![corner(5104, 3824, 4, -1, [u64::MAX, 1 << 63])]),
+                (64, 64, vec![corner(0, 0, 0, 2, [0, 0])]),
             ],
         },
     ]
@@ -177,7 +180,7 @@ fn worked_bytes_hold_the_worked_landmarks() {
     assert_eq!(table.profile(), Profile::Handheld);
     assert_eq!(table.header().corners_limit(), 100);
     assert_eq!(table.header().file_length(), 240);
-    assert_eq!(table.header().table_id(), 0xA6A6_4B33_D660_F318);
+    assert_eq!(table.header().table_id(), 0x1816_9D18_91B7_9AF9);
     assert_eq!(table.landmark(0).map(|landmark| landmark.views), Ok(0..1));
     assert_eq!(table.landmark(1).map(|landmark| landmark.views), Ok(1..3));
     assert_reads(&bytes, &worked_landmarks());
@@ -214,9 +217,9 @@ fn every_record_is_as_written_in_the_specification() {
     let longest = encode_landmark(&longest, Kind::Monument, position, &mut buffer).map(<[u8]>::len);
     assert_eq!(longest, Ok(LANDMARK_BYTES));
 
-    // x 16,368, y 16,368, level 4: the last place of the largest frame; test 0 and test 127 set.
-    let last = [corner(16_368, 16_368, 4, [1, 1 << 63])];
-    let expected = [0x80, 0x08, 0x80, 0x08, 1, 0xF0, 0x3F, 0xFC, 0x4F]
+    // x 8,184, y 8,184, level 4: the last place of the largest frame; commonness 6; test 0 and test 127 set.
+    let last = [corner(16_368, 16_368, 4, 6, [1, 1 << 63])];
+    let expected = [0x80, 0x08, 0x80, 0x08, 1, 0xF8, 0x1F, 0xFF, 0xF3]
         .into_iter()
         .chain([1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0x80])
         .collect::<Vec<u8>>();
@@ -239,7 +242,7 @@ fn kinds_have_one_code_and_one_name_each() {
 
 /// `count` corners on a grid of one level, sorted.
 fn grid(count: usize) -> Vec<Feature> {
-    let place = |n: i32| corner(n % 40 * 256, n / 40 * 256, 0, [n as u64, !n as u64]);
+    let place = |n: i32| corner(n % 40 * 256, n / 40 * 256, 0, (n % 8) as i8 - 1, [n as u64, !n as u64]);
     (0..count as i32).map(place).collect()
 }
 
@@ -330,9 +333,11 @@ fn the_encoder_refuses_what_no_reader_accepts() {
     assert_eq!(none, fault(RecordFault::CornerCount { found: 0, allowed: 100 }));
     let too_many = encode_view(1, 640, 480, &grid(2), &mut buffer);
     assert_eq!(too_many, fault(RecordFault::CornerCount { found: 2, allowed: 1 }));
-    assert!(corner_key(&corner(-1, 0, 0, [0; 2])).is_err());
-    assert!(corner_key(&corner(0, 16_384, 0, [0; 2])).is_err());
-    assert!(corner_key(&corner(0, 0, 5, [0; 2])).is_err());
+    let outside = |x, y| (corner_key(&corner(x, y, 0, 0, [0; 2])), Err(CornerFault::OutsideFrame { x, y }));
+    for (key, refused) in [outside(-1, 0), outside(0, i32::MIN), outside(16_383, 0), outside(0, 16_384)] {
+        assert_eq!(key, refused);
+    }
+    assert_eq!(corner_key(&corner(0, 0, 5, 0, [0; 2])), Err(CornerFault::Level { found: 5 }));
 
     let mut unsorted = worked_landmarks();
     unsorted.swap(0, 1);
@@ -355,6 +360,72 @@ fn the_encoder_refuses_what_no_reader_accepts() {
     early.push_landmark(record).expect("an entry");
     assert!(matches!(early.push_landmark(record), Err(EncodeError::Count { found: 2, announced: 1, .. })));
     assert!(matches!(early.finish(), Err(EncodeError::Count { found: 0, announced: 1, .. })));
+}
+
+/// The corners that a view of 64 x 64 px gives back after it was written.
+fn through_a_view(features: &[Feature]) -> Result<Vec<Feature>, EncodeError> {
+    let view = (64, 64, features.to_vec());
+    let landmark = Enrolled { name: "x".into(), kind: Kind::Other, position: None, views: vec![view] };
+    let bytes = encoded(Profile::Handheld, 100, &[landmark])?;
+    let table = LandmarkTable::open(&bytes).expect("it was written");
+    Ok(table.view(0).expect("it was written").features().collect())
+}
+
+#[test]
+fn every_commonness_comes_back_and_no_other_is_written() {
+    let one = |commonness| [corner(1008, 1006, 4, commonness, [u64::MAX; 2])];
+    for found in i8::MIN..=i8::MAX {
+        let expected = if (-1..=6).contains(&found) {
+            Ok(one(found).to_vec())
+        } else {
+            fault(RecordFault::Corner { index: 0, fault: CornerFault::Commonness { found } })
+        };
+        assert_eq!(through_a_view(&one(found)), expected);
+    }
+}
+
+#[test]
+fn a_corner_off_the_grid_is_not_written() {
+    for (x, y) in [(1, 0), (0, 1), (1007, 1008), (1008, 1007), (501, 333)] {
+        let features = [corner(0, 0, 0, 0, [0; 2]), corner(x, y, 1, 0, [0; 2])];
+        let off_grid = CornerFault::OffGrid { x, y };
+        assert_eq!(corner_key(&features[1]), Err(off_grid));
+        assert_eq!(through_a_view(&features), fault(RecordFault::Corner { index: 1, fault: off_grid }));
+    }
+    let said = RecordFault::Corner { index: 1, fault: CornerFault::OffGrid { x: 1, y: 0 } }.to_string();
+    assert_eq!(said, "corner 1: at 1, 0 (1/16 px) it lies off the grid of 1/8 px: round it");
+    let said = CornerFault::Commonness { found: 7 }.to_string();
+    assert_eq!(said, "commonness 7, allowed are -1 to 6");
+}
+
+#[test]
+fn commonness_takes_no_part_in_the_order() {
+    let at = |x, commonness| corner(x, 8, 2, commonness, [0; 2]);
+    let falling = [at(0, 6), at(2, 3), at(4, -1)];
+    assert_eq!(through_a_view(&falling), Ok(falling.to_vec()));
+    let rising = [at(0, -1), at(2, 3), at(4, 6)];
+    assert_eq!(through_a_view(&rising), Ok(rising.to_vec()));
+    let order = fault(RecordFault::Corner { index: 1, fault: CornerFault::Order });
+    for (first, second) in [(0, 0), (-1, 6), (6, -1), (2, 3)] {
+        assert_eq!(corner_key(&at(4, first)), corner_key(&at(4, second)));
+        assert_eq!(through_a_view(&[at(4, first), at(4, second)]), order, "two corners at one place");
+        assert_eq!(through_a_view(&[at(4, first), at(2, second)]), order, "unsorted");
+    }
+}
+
+#[test]
+fn a_position_comes_to_the_nearest_place_of_the_grid() {
+    let frame_40 = |x| on_grid(ImagePoint::new(x, 0), 40, 1).x;
+    let expected = [(0, 0), (1, 0), (2, 2), (3, 4), (4, 4), (5, 4), (6, 6), (7, 8), (621, 620), (622, 622), (623, 624)];
+    for (x, nearest) in expected {
+        assert_eq!(frame_40(x), nearest, "{x}");
+        assert_eq!(on_grid(ImagePoint::new(0, x), 1, 40), ImagePoint::new(0, nearest), "{x}");
+    }
+    for (x, clamped) in [(624, 624), (625, 624), (640, 624), (i32::MAX, 624), (-1, 0), (-2, 0), (i32::MIN, 0)] {
+        assert_eq!(frame_40(x), clamped, "{x}");
+    }
+    let nowhere = on_grid(ImagePoint::new(7, 7), 0, 0);
+    assert_eq!(nowhere, ImagePoint::new(0, 0), "an empty frame has no place, and none is stored");
 }
 
 #[test]
@@ -381,17 +452,17 @@ fn landmarks_are_found_by_the_id_only_if_their_content_is_the_same() {
     assert_ne!(worked, id(&other, Profile::Handheld, 100));
 }
 
-/// Sorted corners within a frame; the places come from few values, so that some nearly coincide.
+/// Sorted corners on the grid of a frame; the places come from few values, so that some nearly coincide.
 fn corners(width: u16, height: u16) -> impl Strategy<Value = Vec<Feature>> {
     let side = |side: u16| {
-        let last = i32::from(side - 1) * 16;
-        prop_oneof![0..=last, Just(0), Just(last), Just(last / 2)]
+        let last = i32::from(side - 1) * 8;
+        prop_oneof![0..=last, Just(0), Just(last), Just(last / 2)].prop_map(|eighths| eighths * 2)
     };
-    let one = (side(width), side(height), 0_u8..5, any::<[u64; 2]>());
+    let one = (side(width), side(height), 0_u8..5, COMMONNESS, any::<[u64; 2]>());
     prop::collection::vec(one, 1..20).prop_map(|mut corners| {
-        corners.sort_by_key(|&(x, y, level, _)| (level, y, x));
-        corners.dedup_by_key(|&mut (x, y, level, _)| (level, y, x));
-        corners.into_iter().map(|(x, y, level, signature)| corner(x, y, level, signature)).collect()
+        corners.sort_by_key(|&(x, y, level, ..)| (level, y, x));
+        corners.dedup_by_key(|&mut (x, y, level, ..)| (level, y, x));
+        corners.into_iter().map(|(x, y, level, common, signature)| corner(x, y, level, common, signature)).collect()
     })
 }
 
@@ -417,5 +488,31 @@ proptest! {
         landmarks.dedup_by(|a, b| a.name == b.name);
         let bytes = encoded(Profile::Handheld, 100, &landmarks).expect("a table");
         assert_reads(&bytes, &landmarks);
+    }
+
+    /// Wherever enrollment finds a corner, it has a place in the table, and none that could be stored is nearer.
+    #[test]
+    fn whatever_is_brought_to_the_grid_can_be_stored(
+        (width, height) in (1..=1024_u16, 1..=1024_u16),
+        (x, y) in (-40..16_500, -40..16_500),
+        (level, commonness) in (0_u8..5, COMMONNESS),
+    ) {
+        let position = on_grid(ImagePoint::new(x, y), width, height);
+        let features = [corner(position.x, position.y, level, commonness, [0; 2])];
+        prop_assert!(encode_view(100, width, height, &features, &mut [0; 32]).is_ok());
+        prop_assert_eq!(on_grid(position, width, height), position);
+        for (found, asked, side) in [(position.x, x, width), (position.y, y, height)] {
+            let clamped = asked.clamp(0, i32::from(side - 1) * 16);
+            prop_assert!((found - clamped).abs() <= 1);
+        }
+    }
+
+    /// The key sorts as level, row and column do.
+    #[test]
+    fn the_key_sorts_by_level_row_column(two in prop::collection::vec((0_u8..5, 0..8192, 0..8192, COMMONNESS), 2)) {
+        let key = |(level, y, x, commonness)| corner_key(&corner(x * 2, y * 2, level, commonness, [0; 2]));
+        let place = |(level, y, x, _): (u8, i32, i32, i8)| (level, y, x);
+        prop_assert!(key(two[0]).is_ok() && key(two[1]).is_ok());
+        prop_assert_eq!(key(two[0]).ok().cmp(&key(two[1]).ok()), place(two[0]).cmp(&place(two[1])));
     }
 }

@@ -3,6 +3,7 @@
 use heapless::Vec;
 
 use crate::extract::Features;
+use crate::feature::COMMONNESS;
 use crate::kernel::{Kernels, VoteColumns};
 use crate::model::SURPRISE;
 use crate::pyramid::scale;
@@ -13,24 +14,29 @@ pub const GAIN_UNIT: i32 = 64;
 const FREE_BITS: i32 = 5;
 /// A single corner cannot gain more than this.
 const MOST_BITS: i32 = 12;
-/// Distances up to this have a gain.
-pub const FARTHEST: u8 = farthest();
+/// Distances up to this have a gain, for the least common corner.
+const FARTHEST: u8 = farthest();
 /// Neighbours whose distance is within this count as equally near.
 const TIE: u8 = 4;
 
 const fn farthest() -> u8 {
     let mut distance = 0;
-    while SURPRISE[distance as usize + 1] as i32 > 8 * FREE_BITS {
+    while SURPRISE[distance as usize + 1] as i32 > 8 * (FREE_BITS + *COMMONNESS.start() as i32) {
         distance += 1;
     }
     distance
 }
 
-/// The gain of a distance: `clamp(surprise - 5, 0, 12)` bits, in 1/64 bit.
+/// Surprise of a distance between unrelated corners: `-log2 P(at most this)`, in 1/8 bit.
+pub fn surprise(distance: u8) -> u8 {
+    SURPRISE.get(usize::from(distance)).copied().unwrap_or(0)
+}
+
+/// The gain of a distance to a stored corner: `clamp(surprise - commonness - 5, 0, 12)` bits, in 1/64 bit.
 #[inline]
-pub fn gain(distance: u8) -> i32 {
-    let surprise = SURPRISE.get(usize::from(distance)).copied().unwrap_or(0);
-    (i32::from(surprise) * (GAIN_UNIT / 8) - FREE_BITS * GAIN_UNIT).clamp(0, MOST_BITS * GAIN_UNIT)
+pub fn gain(distance: u8, commonness: i8) -> i32 {
+    let free = (FREE_BITS + i32::from(commonness)) * GAIN_UNIT;
+    (i32::from(surprise(distance)) * (GAIN_UNIT / 8) - free).clamp(0, MOST_BITS * GAIN_UNIT)
 }
 
 /// `gain / sqrt(n)` for 1, 2 or 3 neighbours that are equally near: a soft ratio test that keeps repeated windows.
@@ -102,15 +108,18 @@ impl<const CANDIDATES: usize> Candidates<CANDIDATES> {
     /// corner, in their order.
     pub fn collect<K: Kernels>(&mut self, kernels: &K, stored: Features<'_>, query: Features<'_>, distances: &[u8]) {
         self.order.clear();
-        for (number, row) in distances.chunks_exact(query.len().max(1)).take(stored.len()).enumerate() {
+        let rows = distances.chunks_exact(query.len().max(1)).zip(stored.commonness).enumerate();
+        for (number, (row, &commonness)) in rows {
             let nearest = kernels.nearest_three(row, FARTHEST + TIE);
             for (&distance, &place) in nearest.distances.iter().zip(&nearest.places) {
                 if distance > FARTHEST {
                     break;
                 }
                 let equals = nearest.distances.iter().filter(|&&other| other <= distance + TIE).count();
-                let gain = shared(gain(distance), equals);
-                keep_largest(&mut self.order, key(gain, number as u16, place));
+                let gain = shared(gain(distance, commonness), equals);
+                if gain > 0 {
+                    keep_largest(&mut self.order, key(gain, number as u16, place));
+                }
             }
         }
         sort_heap(&mut self.order);

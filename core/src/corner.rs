@@ -118,14 +118,13 @@ impl<const STRIP: usize, const SLOTS: usize> CornerDetector<STRIP, SLOTS> {
     fn sweep<K: Kernels>(&mut self, kernels: &K, level: GrayView<'_>, first: usize, end: usize) {
         let columns = end - first + 2 * PEAK_REACH;
         self.rows.start(columns);
-        for middle in 1..level.height() - 1 {
-            let rows = [middle - 1, middle, middle + 1]
-                .map(|y| level.row(y).get(first - BORDER..end + BORDER).unwrap_or(&[]));
-            if !self.rows.push(kernels, rows) {
+        for latest in 0..level.height() {
+            let pixels = level.row(latest).get(first - BORDER..end + BORDER).unwrap_or(&[]);
+            if !self.rows.push(kernels, pixels) {
                 continue;
             }
             let Some(near) = self.rows.neighbourhood() else { continue };
-            let row = middle - (RESPONSE_ROWS - 2);
+            let row = latest - BORDER;
             let Some(flags) = self.flags.get_mut(..columns) else { continue };
             kernels.peak_flags([near[2], near[3], near[4]], flags);
             // The outer columns belong to the neighbouring strips.

@@ -42,6 +42,7 @@ impl FrontEnd {
 pub struct FeatureSet<const FEATURES: usize> {
     positions: heapless::Vec<ImagePoint, FEATURES>,
     levels: heapless::Vec<u8, FEATURES>,
+    commonness: heapless::Vec<i8, FEATURES>,
     signatures: heapless::Vec<Signature, FEATURES>,
     width: u16,
     height: u16,
@@ -53,6 +54,7 @@ impl<const FEATURES: usize> FeatureSet<FEATURES> {
         Self {
             positions: heapless::Vec::new(),
             levels: heapless::Vec::new(),
+            commonness: heapless::Vec::new(),
             signatures: heapless::Vec::new(),
             width: 0,
             height: 0,
@@ -63,6 +65,7 @@ impl<const FEATURES: usize> FeatureSet<FEATURES> {
     pub fn reset(&mut self, width: u16, height: u16) {
         self.positions.clear();
         self.levels.clear();
+        self.commonness.clear();
         self.signatures.clear();
         (self.width, self.height) = (width, height);
     }
@@ -75,8 +78,9 @@ impl<const FEATURES: usize> FeatureSet<FEATURES> {
         if self.positions.push(feature.position).is_err() {
             return Err(feature);
         }
-        // The three columns have the same length and capacity.
+        // The columns have the same length and capacity.
         let _ = self.levels.push(feature.level);
+        let _ = self.commonness.push(feature.commonness);
         let _ = self.signatures.push(feature.signature);
         Ok(())
     }
@@ -86,6 +90,7 @@ impl<const FEATURES: usize> FeatureSet<FEATURES> {
         Features {
             positions: &self.positions,
             levels: &self.levels,
+            commonness: &self.commonness,
             signatures: &self.signatures,
             width: self.width,
             height: self.height,
@@ -106,6 +111,8 @@ pub struct Features<'a> {
     pub positions: &'a [ImagePoint],
     /// Pyramid levels.
     pub levels: &'a [u8],
+    /// Commonness of each signature, in bits; 0 for a frame's.
+    pub commonness: &'a [i8],
     /// Signatures.
     pub signatures: &'a [Signature],
     /// Width of the frame in pixels.
@@ -130,14 +137,14 @@ impl Features<'_> {
         Some(Feature {
             position: *self.positions.get(number)?,
             level: *self.levels.get(number)?,
+            commonness: *self.commonness.get(number)?,
             signature: *self.signatures.get(number)?,
         })
     }
 
     /// The features one by one.
     pub fn iter(&self) -> impl Iterator<Item = Feature> + '_ {
-        let columns = self.positions.iter().zip(self.levels).zip(self.signatures);
-        columns.map(|((&position, &level), &signature)| Feature { position, level, signature })
+        (0..self.len()).filter_map(|number| self.get(number))
     }
 }
 
@@ -183,7 +190,7 @@ impl<const STRIP: usize, const SLOTS: usize> Extractor<STRIP, SLOTS> {
                 let (x, y) = corner.subpixel();
                 let signature = describe(kernels, level, corner.column, corner.row, scratch);
                 // Settings that ask for more than `FEATURES` lose the coarsest levels' last cells.
-                let _ = features.push(Feature { position: base_from_level(number, x, y), level: number, signature });
+                let _ = features.push(Feature { position: base_from_level(number, x, y), level: number, commonness: 0, signature });
             });
         })
     }

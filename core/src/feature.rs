@@ -28,6 +28,9 @@ impl Signature {
     }
 }
 
+/// The least and the largest commonness of a stored corner, in bits.
+pub const COMMONNESS: core::ops::RangeInclusive<i8> = -1..=6;
+
 /// A corner of one pyramid level with its signature.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub struct Feature {
@@ -35,6 +38,10 @@ pub struct Feature {
     pub position: ImagePoint,
     /// The pyramid level it was found on.
     pub level: u8,
+    /// How much more often than by chance signatures like this one are met, in bits (log2), within [`COMMONNESS`]:
+    /// windows and bricks are common, a clock is not. It lowers the surprise of a match. Measured at enrollment; 0 for
+    /// the corners of a frame.
+    pub commonness: i8,
     /// What it looks like.
     pub signature: Signature,
 }

@@ -7,7 +7,7 @@ use crate::kernel::{Kernels, Seed};
 use crate::transform::Affine;
 
 /// Hypotheses that are verified for a stored view, at most.
-pub const MOST_HYPOTHESES: usize = 4;
+pub const MOST_HYPOTHESES: usize = 8;
 /// A hypothesis with less support than this, in bits, is not worth verifying.
 const LEAST_SUPPORT_BITS: i32 = 6;
 /// Hypotheses that take the view's centre to places closer than this (L1, px) at the same scale are one.

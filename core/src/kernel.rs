@@ -32,6 +32,10 @@ pub trait Kernels {
     fn halve(&self, upper: &[u8], lower: &[u8], out: &mut [u8]) {
         halve(upper, lower, out);
     }
+    /// See [`tone_row`].
+    fn tone_row(&self, row: &[u8], out: &mut [u8]) {
+        tone_row(row, out);
+    }
     /// See [`structure_row`].
     fn structure_row(&self, rows: [&[u8]; 3], products: [&mut [i32]; 3], out: [&mut [i32]; 3]) {
         structure_row(rows, products, out);
@@ -109,9 +113,27 @@ fn pair(chunk: &[u8]) -> [u16; 2] {
     }
 }
 
+/// The tone curve under which corners are detected: close to `16 sqrt(gray)`, so that a corner in the dark counts as
+/// much as one in the light (photon noise grows with the root of the intensity).
+///
+/// It is the least of the six tangents of `16 sqrt(v)` at 1/4, 1, 4, 16, 64 and 256, `2^k v + 2^(6 - k)`: concave,
+/// within 7 % of the root, and nothing but saturating additions.
+#[inline(always)]
+pub fn tone_row(row: &[u8], out: &mut [u8]) {
+    for (&v, out) in row.iter().zip(out) {
+        let v2 = v.saturating_add(v);
+        let v4 = v2.saturating_add(v2);
+        let v8 = v4.saturating_add(v4);
+        let v16 = v8.saturating_add(v8);
+        let dark = v16.saturating_add(4).min(v8.saturating_add(8)).min(v4.saturating_add(16));
+        let bright = v2.saturating_add(32).min(v.saturating_add(64)).min((v >> 1).saturating_add(128));
+        *out = dark.min(bright);
+    }
+}
+
 /// One row of the structure tensor, smoothed along the row.
 ///
-/// `rows` are three neighbouring pixel rows of n + 6 columns. 3 x 3 Sobel gradients (|g| <= 1,020) give the products
+/// `rows` are three neighbouring rows of n + 6 columns. 3 x 3 Sobel gradients (|g| <= 1,020) give the products
 /// `[gx gx, gy gy, gx gy]` in `products` (n + 4 columns); binomial 1-4-6-4-1 with `>> 4` gives `out` (n columns).
 #[inline(always)]
 pub fn structure_row(rows: [&[u8]; 3], products: [&mut [i32]; 3], out: [&mut [i32]; 3]) {
@@ -148,33 +170,18 @@ fn binomial([p0, p1, p2, p3, p4]: [i32; 5]) -> i32 {
 /// order, and a response takes 4 bytes instead of 8.
 #[inline(always)]
 pub fn response_row(rows: [[&[i32]; 3]; 5], out: &mut [f32]) {
-    let n = rows.iter().flatten().fold(out.len(), |n, part| n.min(part.len()));
     let [[xx0, yy0, xy0], [xx1, yy1, xy1], [xx2, yy2, xy2], [xx3, yy3, xy3], [xx4, yy4, xy4]] = rows;
-    let (Some(xx), Some(yy), Some(xy), Some(out)) = (
-        cut([xx0, xx1, xx2, xx3, xx4], n),
-        cut([yy0, yy1, yy2, yy3, yy4], n),
-        cut([xy0, xy1, xy2, xy3, xy4], n),
-        out.get_mut(..n),
-    ) else {
-        return;
-    };
-    // All slices have exactly n elements here, so that no index is checked in the loop.
-    for (i, out) in out.iter_mut().enumerate() {
-        let column = |rows: &[&[i32]; 5]| binomial(rows.map(|row| row[i])) as f32;
-        let (a, b, c) = (column(&xx), column(&yy), column(&xy));
+    let xx = xx0.iter().zip(xx1).zip(xx2).zip(xx3).zip(xx4);
+    let yy = yy0.iter().zip(yy1).zip(yy2).zip(yy3).zip(yy4);
+    let xy = xy0.iter().zip(xy1).zip(xy2).zip(xy3).zip(xy4);
+    for (((xx, yy), xy), out) in xx.zip(yy).zip(xy).zip(out) {
+        let smoothed = |((((p0, p1), p2), p3), p4): ((((&i32, &i32), &i32), &i32), &i32)| {
+            binomial([*p0, *p1, *p2, *p3, *p4]) as f32
+        };
+        let (a, b, c) = (smoothed(xx), smoothed(yy), smoothed(xy));
         let trace = a + b;
         *out = 20.0 * (a * b - c * c) - trace * trace;
     }
-}
-
-/// The first `n` elements of each slice; `None` if one is shorter.
-#[inline(always)]
-fn cut<const COUNT: usize>(rows: [&[i32]; COUNT], n: usize) -> Option<[&[i32]; COUNT]> {
-    let mut result: [&[i32]; COUNT] = [&[]; COUNT];
-    for (result, row) in result.iter_mut().zip(rows) {
-        *result = row.get(..n)?;
-    }
-    Some(result)
 }
 
 /// Marks possible peaks of the middle row with 1: positive, above the left and upper neighbour, not below the right

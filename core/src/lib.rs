@@ -28,3 +28,4 @@ pub mod table;
 
 pub mod verdict;
 pub mod recognizer;
+pub mod capacity;

@@ -3,13 +3,13 @@
 use heapless::Vec;
 
 use crate::candidate::Candidates;
-use crate::evidence::{CornerEvidence, weigh};
+use crate::evidence::{CornerEvidence, total, weigh};
 use crate::extract::Features;
 use crate::hypothesis::{Hypotheses, HypothesisSource, SignatureVotes};
 use crate::kernel::Kernels;
 use crate::query::QueryIndex;
-use crate::refine::{Pairing, refine};
-use crate::transform::{Homography, WeightedPair};
+use crate::refine::{Pairing, Refined, refine};
+use crate::transform::{Homography, Shape, WeightedPair};
 
 /// Fewer candidates than this propose nothing.
 const LEAST_CANDIDATES: usize = 3;
@@ -17,8 +17,14 @@ const LEAST_CANDIDATES: usize = 3;
 /// How well a stored view fits a frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ViewMatch {
-    /// Evidence for the view, in 1/160 bit.
+    /// Evidence for the view, all told, in 1/160 bit: [`total`].
     pub evidence: i32,
+    /// What its corners say, in 1/160 bit.
+    pub corner_evidence: i32,
+    /// Support of the hypothesis that led to the map, in 1/64 bit.
+    pub support: i32,
+    /// Shape of the map where it is known best.
+    pub shape: Shape,
     /// Where the view lies in the frame.
     pub frame_from_view: Homography,
     /// Stored corners with evidence in favour.
@@ -75,10 +81,14 @@ impl<const STORED: usize, const CANDIDATES: usize> Matcher<STORED, CANDIDATES> {
         let mut best: Option<ViewMatch> = None;
         for hypothesis in hypotheses.iter() {
             let Some(refined) = refine(&pairing, self.candidates.view(), hypothesis, &mut self.pairs) else { continue };
-            let evidence = weigh(&pairing, &refined, &mut self.corners);
+            let corner_evidence = weigh(&pairing, &refined, &mut self.corners);
+            let supporting_corners = self.corners.iter().filter(|corner| corner.evidence > 0).count() as u16;
+            let Refined { frame_from_view, shape, .. } = refined;
+            let evidence = total(corner_evidence, supporting_corners, hypothesis.support, shape);
             if best.is_none_or(|best| evidence > best.evidence) {
-                let supporting_corners = self.corners.iter().filter(|corner| corner.evidence > 0).count() as u16;
-                best = Some(ViewMatch { evidence, frame_from_view: refined.frame_from_view, supporting_corners });
+                let support = hypothesis.support;
+                best =
+                    Some(ViewMatch { evidence, corner_evidence, support, shape, frame_from_view, supporting_corners });
                 core::mem::swap(&mut self.corners, &mut self.best_corners);
             }
         }

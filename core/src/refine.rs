@@ -8,7 +8,7 @@ use crate::hypothesis::Hypothesis;
 use crate::kernel::{SLACK, SLACK_PER_PIXEL};
 use crate::pyramid::{LEVELS, scale};
 use crate::query::QueryIndex;
-use crate::transform::{Homography, Normalization, WeightedPair, fit_affine, fit_homography};
+use crate::transform::{Homography, Normalization, Shape, WeightedPair, fit_affine, fit_homography};
 
 /// Search radius of each round, in pixels.
 const RADII: [f32; 4] = [24.0, 58.0 / 3.0, 44.0 / 3.0, 10.0];
@@ -69,8 +69,8 @@ pub struct Refined {
     pub frame_from_view: Homography,
     /// The mean of the stored corners that it was fitted to, in pixels of the view.
     pub centre: [f32; 2],
-    /// Its scale there.
-    pub scale: f32,
+    /// Its shape there.
+    pub shape: Shape,
 }
 
 /// Refines a hypothesis; `None` if it loses its pairs or becomes a map that no camera sees.
@@ -85,27 +85,26 @@ pub fn refine<const QUERY: usize, const PAIRS: usize>(
     supporters(candidates, hypothesis, pairs);
     let mut map = Homography::from(fit_affine(pairs, hypothesis.scale, RIDGE[0])?);
     let mut map_scale = hypothesis.scale;
-    let mut centre = hypothesis.anchor;
+    let mut refined = None;
     for (round, radius) in RADII.into_iter().enumerate() {
         guided_pairs(pairing, &map, map_scale, radius, pairs);
         if pairs.len() < LEAST_PAIRS {
             return None;
         }
         let sum = pairs.iter().fold([0.0; 2], |[x, y], pair| [x + pair.from[0], y + pair.from[1]]);
-        centre = sum.map(|sum| sum / pairs.len() as f32);
+        let centre = sum.map(|sum| sum / pairs.len() as f32);
         map = Homography::from(fit_affine(pairs, map_scale, RIDGE[1])?);
         if round >= HOMOGRAPHY_FROM && pairs.len() >= HOMOGRAPHY_PAIRS {
             let source = Normalization::of_frame(pairing.stored.width, pairing.stored.height);
             let target = Normalization::of_frame(pairing.query.width, pairing.query.height);
             let projective = fit_homography(pairs, source, target, PERSPECTIVE_RIDGE);
-            map = projective.filter(|map| map.is_plausible(centre)).unwrap_or(map);
+            map = projective.filter(|map| map.shape(centre).is_some()).unwrap_or(map);
         }
-        if !map.is_plausible(centre) {
-            return None;
-        }
-        map_scale = map.scale(centre);
+        let shape = map.shape(centre)?;
+        map_scale = shape.scale;
+        refined = Some(Refined { frame_from_view: map, centre, shape });
     }
-    Some(Refined { frame_from_view: map, centre, scale: map_scale })
+    refined
 }
 
 /// The candidates that agree with a hypothesis, weighted by gain and closeness.
@@ -151,8 +150,8 @@ fn guided_pairs<const QUERY: usize, const PAIRS: usize>(
     pairs.clear();
     let fitting = fitting_levels(map_scale);
     let fall = 1.0 / (1.2 * radius * radius);
-    let corners = pairing.stored.positions.iter().zip(pairing.stored.levels).enumerate();
-    for (number, (position, &level)) in corners {
+    let corners = pairing.stored.positions.iter().zip(pairing.stored.levels).zip(pairing.stored.commonness);
+    for (number, ((position, &level), &commonness)) in corners.enumerate() {
         let from = position.to_pixels();
         let levels = fitting.get(usize::from(level)).copied().unwrap_or(0);
         let row = pairing.row(number);
@@ -161,7 +160,7 @@ fn guided_pairs<const QUERY: usize, const PAIRS: usize>(
             if levels >> level & 1 == 0 {
                 return;
             }
-            let gain = row.get(usize::from(query)).map_or(0, |&distance| gain(distance));
+            let gain = row.get(usize::from(query)).map_or(0, |&distance| gain(distance, commonness));
             let weight = gain as f32 * (1.0 - squared * fall);
             if weight > best.0 {
                 best = (weight, query);

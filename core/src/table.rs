@@ -56,7 +56,7 @@ pub use landmark::{
     ERROR_LIMIT_DM, GeoPosition, LANDMARK_BYTES, LATITUDE_LIMIT_E7, LONGITUDE_LIMIT_E7, Landmark, NAME_BYTES,
 };
 pub use stream::TableStream;
-pub use view::{CORNER_BYTES, LEVELS, SIDE_LIMIT, StoredView, VIEW_HEADER_BYTES, corner_key};
+pub use view::{CORNER_BYTES, LEVELS, SIDE_LIMIT, StoredView, VIEW_HEADER_BYTES, corner_key, on_grid};
 
 use crate::profile::Profile;
 

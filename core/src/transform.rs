@@ -4,6 +4,8 @@
 
 use nalgebra::{SMatrix, SVector};
 
+use crate::math::sqrt;
+
 /// `y = L x + t`, an affine map of pixels to pixels.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Affine {
@@ -64,35 +66,39 @@ impl Homography {
         ([[(a - u * g) / w, (b - u * h) / w], [(d - v * g) / w, (e - v * h) / w]], w)
     }
 
-    /// The local scale at a point: the square root of the area that a unit area there maps to; 0 where mirrored.
-    pub fn scale(&self, at: [f32; 2]) -> f32 {
-        crate::math::sqrt(determinant(self.jacobian(at).0))
-    }
-
-    /// Whether the map is one that a camera could see an upright facade by, judged at a point of the source frame.
+    /// The shape of the map at a point of the source frame, if a camera could see an upright facade by it.
     ///
-    /// Refused: mirror images and collapsed or exploded maps (determinant of the derivative outside 0.02..40), ratio
-    /// of its singular values above 3.5, the vertical turned by more than 0.45 rad, and points behind or close to the
-    /// vanishing line (`w < 0.2`).
-    pub fn is_plausible(&self, at: [f32; 2]) -> bool {
+    /// `None` for mirror images and collapsed or exploded maps (determinant of the derivative outside 0.02..40), a
+    /// ratio of its singular values above 3.5, the vertical turned by more than 0.45 rad, and points behind or close to
+    /// the vanishing line (`w < 0.2`).
+    pub fn shape(&self, at: [f32; 2]) -> Option<Shape> {
         /// Largest ratio of singular values.
         const STRETCH: f32 = 3.5;
         /// tan(0.45 rad).
         const LEAN: f32 = 0.483_055_1;
-        let (jacobian, w) = self.jacobian(at);
-        let [[a, b], [c, d]] = jacobian;
-        let area = determinant(jacobian);
-        if !(w >= 0.2 && area > 0.02 && area < 40.0) {
-            return false;
+        let ([[a, b], [c, d]], w) = self.jacobian(at);
+        let area = a * d - b * c;
+        if !(w >= 0.2 && area > 0.02 && area < 40.0 && a > 0.0 && d > 0.0 && b.abs() <= LEAN * d) {
+            return None;
         }
-        // s1 / s2 <= k  <=>  s1^2 + s2^2 <= (k + 1/k) s1 s2, with the sum the squared norm and the product the area.
+        // The singular values: their squares add up to the squared norm, their product is the area.
         let norm = a * a + b * b + c * c + d * d;
-        norm <= (STRETCH + 1.0 / STRETCH) * area && a > 0.0 && d > 0.0 && b.abs() <= LEAN * d
+        let difference = sqrt(norm * norm - 4.0 * area * area);
+        let ratio = sqrt((norm + difference) / (norm - difference));
+        // NaN or infinite where the smaller one vanishes: then the ratio is beyond any limit.
+        (ratio <= STRETCH).then(|| Shape { scale: sqrt(area), ratio, shear: [b / d, c / a] })
     }
 }
 
-fn determinant([[a, b], [c, d]]: [[f32; 2]; 2]) -> f32 {
-    a * d - b * c
+/// The derivative of an upright map at a point, taken apart.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Shape {
+    /// Square root of the area that a unit area maps to.
+    pub scale: f32,
+    /// Ratio of the larger to the smaller singular value, 1 or more: foreshortening.
+    pub ratio: f32,
+    /// How far the vertical leans to the side and the horizontal rises, as tangents.
+    pub shear: [f32; 2],
 }
 
 /// A correspondence with its weight.

@@ -89,6 +89,7 @@ macro_rules! all_kernels {
             $(#[$doc])* $name, $features, $list;
             shrink_seven_to_five(rows: [&[u8]; 3], weights: [u16; 3], out: &mut [u8]);
             halve(upper: &[u8], lower: &[u8], out: &mut [u8]);
+            tone_row(row: &[u8], out: &mut [u8]);
             structure_row(rows: [&[u8]; 3], products: [&mut [i32]; 3], out: [&mut [i32]; 3]);
             response_row(rows: [[&[i32]; 3]; 5], out: &mut [f32]);
             peak_flags(rows: [&[f32]; 3], flags: &mut [u8]);

@@ -195,7 +195,7 @@ impl OwnedTable {
 
 fn encode_sorted(corners_limit: u16, view: &ViewEntry) -> Result<Vec<u8>, EncodeError> {
     let mut features = view.features.clone();
-    // A corner that cannot be stored sorts to the end and is refused there.
+    // A corner that has no place in any view sorts to the end and is refused there.
     features.sort_by_key(|feature| corner_key(feature).unwrap_or(u32::MAX));
     let mut record = vec![0; VIEW_HEADER_BYTES + features.len() * CORNER_BYTES];
     let length = encode_view(corners_limit, view.width, view.height, &features, &mut record)?.len();
@@ -304,6 +304,7 @@ mod tests {
         let corner = |n: u64| Feature {
             position: ImagePoint::new(((n * 7_919 + seed) % 1_000 * 8) as i32, (n * 16) as i32),
             level: (n % 5) as u8,
+            commonness: (n % 8) as i8 - 1,
             signature: daymark_core::feature::Signature([n, seed]),
         };
         ViewEntry { width: 640, height: 480, features: (0..100).map(corner).collect() }
@@ -397,12 +398,20 @@ mod tests {
         outside.views[1].features[7].position.x = -1;
         let corner = said(vec![outside]);
         assert!(corner.contains(r#"landmark "tower", view 1: "#) && corner.contains("at -1, "), "{corner}");
+        let mut off_grid = landmark("tower", &[1]);
+        off_grid.views[0].features[7].position.x += 1;
+        let corner = said(vec![off_grid]);
+        assert!(corner.contains(r#"landmark "tower", view 0: "#) && corner.contains("the grid of 1/8 px"), "{corner}");
+        let mut common = landmark("tower", &[1]);
+        common.views[0].features[7].commonness = 7;
+        let corner = said(vec![common]);
+        assert!(corner.contains("commonness 7, allowed are -1 to 6"), "{corner}");
         let mut large = landmark("tower", &[1]);
         large.views[0].features.push(Feature { level: 4, ..Feature::default() });
         let large = OwnedTable { profile: Profile::Handheld, landmarks: vec![large] };
         assert!(matches!(large.to_bytes(), Err(BuildError::Table(EncodeError::Header(_)))));
         let mut double = landmark("tower", &[1]);
-        double.views[0].features[1] = double.views[0].features[0];
+        double.views[0].features[1] = Feature { commonness: 6, ..double.views[0].features[0] };
         let double = OwnedTable { profile: Profile::Handheld, landmarks: vec![double] };
         let Err(BuildError::View(_, 0, EncodeError::Record(RecordFault::Corner { index: 1, .. }))) = double.to_bytes()
         else {
@@ -414,7 +423,7 @@ mod tests {
     #[test]
     fn a_view_of_more_corners_than_enrollment_keeps_raises_the_tables_limit() {
         let mut views = vec![view(1)];
-        let more = |n: i32| Feature { position: ImagePoint::new(n, 0), ..Feature::default() };
+        let more = |n: i32| Feature { position: ImagePoint::new(2 * n, 0), ..Feature::default() };
         views[0].features = (0..500).map(more).collect();
         let landmark = LandmarkEntry { views, ..landmark("tower", &[]) };
         let limit = |table: &OwnedTable| Header::decode(&table.to_bytes().expect("a table")).map(|h| h.corners_limit());

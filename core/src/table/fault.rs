@@ -1,6 +1,7 @@
 //! What is wrong inside a header, an index entry or a record: the reason within a [`TableError`](super::TableError).
 
 use super::{CORNER_BYTES, ERROR_LIMIT_DM, LATITUDE_LIMIT_E7, LEVELS, LONGITUDE_LIMIT_E7, NAME_BYTES, SIDE_LIMIT};
+use crate::feature::COMMONNESS;
 use core::fmt;
 
 /// A header whose checksum is right and whose content is not: a faulty program wrote it.
@@ -167,8 +168,6 @@ pub enum RecordFault {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum CornerFault {
-    /// Bit 31 of the corner's word is set.
-    ReservedBit,
     /// There is no such pyramid level.
     Level {
         /// The level that was found.
@@ -180,6 +179,19 @@ pub enum CornerFault {
         x: i32,
         /// In 1/16 px.
         y: i32,
+    },
+    /// It does not stand on the grid of 1/8 px; only in writing. Bring it there with
+    /// [`on_grid`](super::on_grid).
+    OffGrid {
+        /// In 1/16 px; x or y is odd.
+        x: i32,
+        /// In 1/16 px.
+        y: i32,
+    },
+    /// Its commonness has no room in a table; only in writing.
+    Commonness {
+        /// In bits, outside [`COMMONNESS`].
+        found: i8,
     },
     /// It does not sort after the corner before it by level, row, column.
     Order,
@@ -261,9 +273,13 @@ impl fmt::Display for RecordFault {
 impl fmt::Display for CornerFault {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
-            Self::ReservedBit => write!(out, "its highest bit is set"),
             Self::Level { found } => write!(out, "level {found}, the levels are 0 to {}", LEVELS.saturating_sub(1)),
             Self::OutsideFrame { x, y } => write!(out, "at {x}, {y} (1/16 px) it lies outside the view's frame"),
+            Self::OffGrid { x, y } => write!(out, "at {x}, {y} (1/16 px) it lies off the grid of 1/8 px: round it"),
+            Self::Commonness { found } => {
+                let (least, most) = (COMMONNESS.start(), COMMONNESS.end());
+                write!(out, "commonness {found}, allowed are {least} to {most}")
+            }
             Self::Order => write!(out, "it does not sort after the one before it by level, row, column"),
         }
     }

@@ -1,15 +1,259 @@
-//! `daymark recognize`.
+//! `daymark recognize`: which building of a table each frame shows.
+
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use daymark_core::table::LandmarkTable;
+use daymark_core::verdict::FalseAnswer;
+use serde::Serialize;
 
 use super::{CommandError, Outcome};
+use crate::engine::{Engine, FRAME_SIDE};
+use crate::picture::{GrayImage, read_gray};
+use crate::report::explain::{Explained, ViewExplanation};
+use crate::report::finding::{Finding, Times, VerdictName};
+use crate::report::overlay::Overlay;
+use crate::report::{phrase, text};
+use crate::table_file::{open_table, read_table};
+
+/// Version of the form of `--json`.
+const SCHEMA_VERSION: u32 = 1;
 
 /// Arguments of `daymark recognize`.
 #[derive(Debug, clap::Args)]
-pub struct Args {}
+#[command(after_help = "Exit codes: 0 every frame shows a known building, 1 some frame has no answer, \
+                        2 an error; frames that can be read are answered all the same.")]
+pub struct Args {
+    /// The table to recognize buildings of, as `daymark enroll` makes it
+    #[arg(long, value_name = "TABLE")]
+    table: PathBuf,
+    /// Pictures to recognize: JPEG, PNG, WebP, TIFF, BMP or PNM
+    #[arg(required = true, value_name = "FRAMES")]
+    frames: Vec<PathBuf>,
+    /// Answer only if the answer is false with at most this probability; smaller is more careful
+    #[arg(long, value_name = "PROBABILITY", default_value_t = 0.01, value_parser = probability)]
+    max_false_answer: f64,
+    /// Print one JSON document instead of text
+    #[arg(long)]
+    json: bool,
+    /// Tell which corners matched, what each was worth, and why the runner-up lost
+    #[arg(long)]
+    explain: bool,
+    /// Draw the frame with its matched corners and the outline of the stored view; several frames are numbered out-1.svg...
+    #[arg(long, value_name = "OUT.svg")]
+    overlay: Option<PathBuf>,
+}
+
+/// A probability on the command line: above 0, at most 1.
+///
+/// # Errors
+/// What is wrong with it.
+pub(super) fn probability(text: &str) -> Result<f64, String> {
+    let advice = "give a probability above 0 and at most 1, such as 0.01";
+    match text.parse::<f64>() {
+        Ok(value) if value > 0.0 && value <= 1.0 => Ok(value),
+        _ => Err(advice.to_owned()),
+    }
+}
+
+/// The JSON document.
+#[derive(Debug, Serialize)]
+struct Document<'a> {
+    schema_version: u32,
+    program_version: &'static str,
+    settings: Settings,
+    table: TableFacts,
+    frames: &'a [Finding],
+    summary: Summary,
+}
+
+#[derive(Debug, Serialize)]
+struct Settings {
+    max_false_answer: f64,
+    longer_side_px: usize,
+}
+
+#[derive(Debug, Serialize)]
+struct TableFacts {
+    file: String,
+    table_id: String,
+    profile: &'static str,
+    landmarks: u32,
+    views: u32,
+}
+
+/// How many frames got which verdict.
+#[derive(Debug, Default, Clone, Copy, Serialize)]
+struct Summary {
+    known: usize,
+    ambiguous: usize,
+    unknown: usize,
+    unreadable: usize,
+}
+
+impl Summary {
+    fn enter(&mut self, verdict: VerdictName) {
+        *match verdict {
+            VerdictName::Known => &mut self.known,
+            VerdictName::Ambiguous => &mut self.ambiguous,
+            VerdictName::Unknown => &mut self.unknown,
+            VerdictName::Unreadable => &mut self.unreadable,
+        } += 1;
+    }
+}
 
 /// Runs the command.
 ///
 /// # Errors
-/// Not yet.
-pub fn run(_args: &Args) -> Result<Outcome, CommandError> {
-    Err("not written yet".into())
+/// A table that cannot be read, a frame that cannot be read (after the others were answered), an overlay that cannot be
+/// written.
+pub fn run(args: &Args) -> Result<Outcome, CommandError> {
+    let bytes = read_table(&args.table)?;
+    let table = open_table(&args.table, &bytes)?;
+    let mut engine = Engine::new(table.profile());
+    let mut findings = Vec::new();
+    let mut summary = Summary::default();
+    for (number, path) in (1..).zip(&args.frames) {
+        let overlay = args.overlay.as_deref().map(|path| numbered(path, number, args.frames.len()));
+        let finding = look(args, &mut engine, table, path, overlay.as_deref())?;
+        summary.enter(finding.verdict);
+        if args.json {
+            findings.push(finding);
+        } else {
+            print(args, &finding, number)?;
+        }
+    }
+    if args.json {
+        let header = table.header();
+        let document = Document {
+            schema_version: SCHEMA_VERSION,
+            program_version: env!("CARGO_PKG_VERSION"),
+            settings: Settings { max_false_answer: args.max_false_answer, longer_side_px: FRAME_SIDE },
+            table: TableFacts {
+                file: args.table.to_string_lossy().into_owned(),
+                table_id: format!("{:016x}", header.table_id()),
+                profile: header.profile().name(),
+                landmarks: header.landmark_count(),
+                views: header.view_count(),
+            },
+            frames: &findings,
+            summary,
+        };
+        writeln!(io::stdout(), "{}", serde_json::to_string_pretty(&document)?)?;
+    }
+    match summary {
+        Summary { unreadable: 0, ambiguous: 0, unknown: 0, .. } => Ok(Outcome::Done),
+        Summary { unreadable: 0, .. } => Ok(Outcome::NoAnswer),
+        Summary { unreadable, .. } => {
+            let frames = phrase::count(args.frames.len(), "frame");
+            Err(format!("{unreadable} of {frames} could not be read, as told above").into())
+        }
+    }
+}
+
+/// One frame from its file to what is said about it.
+fn look(
+    args: &Args,
+    engine: &mut Engine,
+    mut table: LandmarkTable<'_>,
+    path: &Path,
+    overlay: Option<&Path>,
+) -> Result<Finding, CommandError> {
+    let begin = Instant::now();
+    let frame = match read_gray(path) {
+        Ok(image) => image.shrunk_to(FRAME_SIDE),
+        Err(error) => {
+            writeln!(io::stderr(), "error: {error}")?;
+            return Ok(Finding::unreadable(&error));
+        }
+    };
+    let read = Instant::now();
+    engine.extract(&frame).map_err(|error| format!("{}: {error}", path.display()))?;
+    let extracted = Instant::now();
+    let recognition = engine.recognize(&mut table, FalseAnswer::at_most(args.max_false_answer))?;
+    let matched = Instant::now();
+
+    let mut finding = Finding::new(path, &frame, &recognition, &table)?;
+    let ms = |from: Instant, to: Instant| (to - from).as_secs_f64() * 1e3;
+    finding.times = Some(Times {
+        read_ms: ms(begin, read),
+        features_ms: ms(read, extracted),
+        matching_ms: ms(extracted, matched),
+    });
+    if args.explain {
+        let (best, runner_up) = (recognition.best.as_ref(), recognition.runner_up.as_ref());
+        finding.explanation = Some(Explained::new(engine, &table, best, runner_up)?);
+    }
+    if let Some(file) = overlay {
+        let best = match &recognition.best {
+            Some(best) => ViewExplanation::new(engine, &table, best)?,
+            None => None,
+        };
+        draw(file, &frame, &finding, best.as_ref())?;
+        finding.overlay_file = Some(file.to_string_lossy().into_owned());
+    }
+    Ok(finding)
+}
+
+fn draw(
+    file: &Path,
+    frame: &GrayImage,
+    finding: &Finding,
+    best: Option<&ViewExplanation>,
+) -> Result<(), CommandError> {
+    let svg = Overlay { frame, finding, best, stored_picture: None }.to_svg();
+    std::fs::write(file, svg).map_err(|error| {
+        format!("cannot write the overlay {}: {error}; give a path in a folder that exists and is yours", file.display())
+    })?;
+    Ok(())
+}
+
+fn print(args: &Args, finding: &Finding, number: usize) -> io::Result<()> {
+    if finding.verdict == VerdictName::Unreadable {
+        return Ok(());
+    }
+    let mut out = io::stdout().lock();
+    if number > 1 {
+        writeln!(out)?;
+    }
+    out.write_all(text::finding(finding, args.max_false_answer).as_bytes())?;
+    if let Some(explained) = &finding.explanation {
+        out.write_all(text::explanation(explained).as_bytes())?;
+    }
+    Ok(())
+}
+
+/// `out.svg` for one frame; `out-1.svg` and so on for several.
+fn numbered(path: &Path, number: usize, of: usize) -> PathBuf {
+    if of == 1 {
+        return path.to_owned();
+    }
+    let part = |part: Option<&std::ffi::OsStr>| part.map(|part| part.to_string_lossy().into_owned());
+    let stem = part(path.file_stem()).unwrap_or_else(|| "overlay".to_owned());
+    path.with_file_name(match part(path.extension()) {
+        Some(extension) => format!("{stem}-{number}.{extension}"),
+        None => format!("{stem}-{number}"),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn several_overlays_are_numbered() {
+        assert_eq!(numbered(Path::new("a/out.svg"), 1, 1), Path::new("a/out.svg"));
+        assert_eq!(numbered(Path::new("a/out.svg"), 2, 3), Path::new("a/out-2.svg"));
+        assert_eq!(numbered(Path::new("out"), 3, 3), Path::new("out-3"));
+    }
+
+    #[test]
+    fn a_probability_is_above_zero_and_at_most_one() {
+        assert_eq!(probability("0.01"), Ok(0.01));
+        assert_eq!(probability("1"), Ok(1.0));
+        for wrong in ["0", "-0.1", "1.1", "NaN", "inf", "1%", ""] {
+            assert!(probability(wrong).is_err(), "{wrong}");
+        }
+    }
 }

@@ -1,18 +1,18 @@
 //! Which corners of a picture are worth storing: those that are found again, and not confused, in simulated views.
 
+use daymark_core::candidate::surprise;
 use daymark_core::extract::{Extractor, FeatureSet, FrontEnd};
-use daymark_core::feature::Feature;
+use daymark_core::feature::{COMMONNESS, Feature, Signature};
 use daymark_core::kernel::Kernels;
-use daymark_core::math::log2_q8;
+use daymark_core::math::{exp2, log2, log2_q8};
 use daymark_core::pyramid::{level_bytes, scale};
+use daymark_core::table::on_grid;
 
 use super::simulate::CHANGES;
 use crate::picture::GrayImage;
 
 /// Candidates of a picture, at most.
 pub const MOST_CANDIDATES: usize = 1_600;
-/// A distance from here on counts as not found.
-const LOST: i64 = 54;
 /// e^0.55, the tolerance of a corner's scale.
 const SCALE_TOLERANCE: f32 = 1.733_253;
 /// Cells over the picture that share the places, and the least distance of two kept corners in pixels.
@@ -32,37 +32,71 @@ pub struct Selection {
 
 type WideExtractor = Extractor<256, { 48 * 3 * 64 }>;
 
-/// The corners to store, best first for the places and then in the table's order.
-pub fn select_corners<K: Kernels>(kernels: &K, image: &GrayImage, selection: Selection) -> Vec<Feature> {
-    let mut extractor: Box<WideExtractor> = Box::default();
-    let mut levels = vec![0; level_bytes(image.width, image.height)];
-    let mut features: Box<FeatureSet<MOST_CANDIDATES>> = Box::default();
-    let mut extract = |image: &GrayImage, front_end| -> Vec<Feature> {
-        let Ok(view) = image.view() else { return Vec::new() };
-        match extractor.extract(kernels, view, front_end, &mut levels, &mut features) {
-            Ok(()) => features.view().iter().collect(),
-            Err(_) => Vec::new(),
-        }
-    };
-    let candidates = extract(image, selection.candidates);
-    let mut scores = vec![0_i64; candidates.len()];
-    for (seed, change) in CHANGES.iter().enumerate() {
-        let found = extract(&change.render(image, seed as u64), selection.query);
-        let map_scale = daymark_core::math::sqrt(change.area() as f32);
-        for (candidate, score) in candidates.iter().zip(&mut scores) {
-            let [x, y] = candidate.position.to_pixels();
-            let place = change.apply(image, [f64::from(x), f64::from(y)]);
-            *score += survival(candidate, place, map_scale, &found);
-        }
-    }
-    keep_spread(&candidates, &scores, image, selection.keep)
+/// A corner that may be stored, with what the simulated views and the turned copies said of it.
+struct Candidate {
+    feature: Feature,
+    /// Survival in the simulated views, 0..=6 in Q24.
+    survival: i64,
+    /// log2 of how much more often than by chance the turned copies hold a signature like this.
+    commonness: f64,
 }
 
-/// `(1 - d / 53.8) / (1 + log2(1 + rank) / 2)` in Q16, at least 0: `d` the distance to the nearest signature at the
-/// right place, `rank` the number of corners elsewhere that are nearer.
-fn survival(candidate: &Feature, [x, y]: [f64; 2], map_scale: f32, found: &[Feature]) -> i64 {
-    let expected = scale(candidate.level) * map_scale;
-    let right = |feature: &Feature| {
+/// The corners to store, in the table's order. Deterministic: the same picture gives the same corners.
+///
+/// Six simulated views are read exactly like frames; a candidate is worth what it survives, divided by the root of how
+/// common its signature is.
+pub fn select_corners<K: Kernels>(kernels: &K, image: &GrayImage, selection: Selection) -> Vec<Feature> {
+    let mut reader = Reader::new(kernels);
+    let fresh = |feature| Candidate { feature, survival: 0, commonness: 0.0 };
+    let mut candidates: Vec<Candidate> = reader.read(image, selection.candidates).into_iter().map(fresh).collect();
+    for (seed, change) in CHANGES.iter().enumerate() {
+        let found = reader.read(&change.render(image, seed as u64), selection.query);
+        let map_scale = daymark_core::math::sqrt(change.area() as f32);
+        for candidate in &mut candidates {
+            let [x, y] = candidate.feature.position.to_pixels();
+            let place = change.apply(image, [f64::from(x), f64::from(y)]);
+            observe(candidate, place, map_scale, &found);
+        }
+    }
+    let strangers: Vec<Signature> = turned_copies(image)
+        .iter()
+        .flat_map(|turned| reader.read(turned, selection.query))
+        .map(|feature| feature.signature)
+        .collect();
+    for candidate in &mut candidates {
+        candidate.commonness = commonness(candidate.feature.signature, &strangers);
+    }
+    keep_spread(&candidates, image, selection.keep)
+}
+
+/// Reads pictures as a camera frame is read.
+struct Reader<'a, K> {
+    kernels: &'a K,
+    extractor: Box<WideExtractor>,
+    levels: Vec<u8>,
+    features: Box<FeatureSet<MOST_CANDIDATES>>,
+}
+
+impl<'a, K: Kernels> Reader<'a, K> {
+    fn new(kernels: &'a K) -> Self {
+        Self { kernels, extractor: Box::default(), levels: Vec::new(), features: Box::default() }
+    }
+
+    fn read(&mut self, image: &GrayImage, front_end: FrontEnd) -> Vec<Feature> {
+        self.levels.resize(level_bytes(image.width, image.height), 0);
+        let Ok(view) = image.view() else { return Vec::new() };
+        match self.extractor.extract(self.kernels, view, front_end, &mut self.levels, &mut self.features) {
+            Ok(()) => self.features.view().iter().collect(),
+            Err(_) => Vec::new(),
+        }
+    }
+}
+
+/// Adds `(1 - d / 53.8) / (1 + log2(1 + rank) / 2)`, at least 0, to a candidate's survival: `d` is the distance to the
+/// nearest signature at the right place, `rank` the number of corners elsewhere that are nearer.
+fn observe(candidate: &mut Candidate, [x, y]: [f64; 2], map_scale: f32, found: &[Feature]) {
+    let expected = scale(candidate.feature.level) * map_scale;
+    let is_here = |feature: &Feature| {
         let size = scale(feature.level);
         let [px, py] = feature.position.to_pixels();
         let (dx, dy) = (f64::from(px) - x, f64::from(py) - y);
@@ -71,27 +105,57 @@ fn survival(candidate: &Feature, [x, y]: [f64; 2], map_scale: f32, found: &[Feat
             && size < expected * SCALE_TOLERANCE
             && expected < size * SCALE_TOLERANCE
     };
-    let distance = |feature: &Feature| candidate.signature.distance(feature.signature);
-    let Some(nearest) = found.iter().filter(|feature| right(feature)).map(distance).min() else { return 0 };
-    let rank = found.iter().filter(|feature| distance(feature) < nearest && !right(feature)).count();
-    let closeness = (5_376 - 100 * i64::from(nearest)).max(0);
-    debug_assert!(closeness == 0 || i64::from(nearest) < LOST);
-    (closeness << 24) / (5_376 * (256 + i64::from(log2_q8(1 + rank as u32)) / 2))
+    let distance = |feature: &Feature| candidate.feature.signature.distance(feature.signature);
+    let Some(least) = found.iter().filter(|feature| is_here(feature)).map(distance).min() else { return };
+    let rank = found.iter().filter(|feature| distance(feature) < least && !is_here(feature)).count();
+    let closeness = (5_376 - 100 * i64::from(least)).max(0);
+    candidate.survival += (closeness << 24) / (5_376 * (256 + i64::from(log2_q8(1 + rank as u32)) / 2)) * 256;
+}
+
+/// The picture upside down, turned by 180 degrees, and both kinds turned by 90: like the picture in every statistic,
+/// but a building that no frame shows. What matches there matches by chance.
+fn turned_copies(image: &GrayImage) -> [GrayImage; 4] {
+    let copy = |pixels: Vec<u8>| GrayImage { pixels, ..*image };
+    let flipped = copy(image.pixels.chunks(image.width).rev().flatten().copied().collect());
+    let turned = copy(image.pixels.iter().rev().copied().collect());
+    let quarter = |image: &GrayImage| GrayImage {
+        pixels: (0..image.width)
+            .flat_map(|x| (0..image.height).rev().map(move |y| image.pixels[y * image.width + x]))
+            .collect(),
+        width: image.height,
+        height: image.width,
+    };
+    let (on_side, flipped_on_side) = (quarter(image), quarter(&flipped));
+    [flipped, turned, on_side, flipped_on_side]
+}
+
+/// `log2((k + 4) / (expected + 4))` within -1..=6: `k` strangers are as near as one in 2^10 would be by chance.
+fn commonness(signature: Signature, strangers: &[Signature]) -> f64 {
+    /// A surprise of 10 bits, in 1/8 bit.
+    const TEN_BITS: u8 = 80;
+    let farthest = (0..=128_u8).take_while(|&distance| surprise(distance) >= TEN_BITS).last().unwrap_or(0);
+    let near = strangers.iter().filter(|&&other| signature.distance(other) <= u32::from(farthest)).count();
+    let expected = strangers.len() as f64 * exp2(-f64::from(surprise(farthest)) / 8.0);
+    let (least, most) = (f64::from(*COMMONNESS.start()), f64::from(*COMMONNESS.end()));
+    log2((near as f64 + 4.0) / (expected + 4.0)).clamp(least, most)
 }
 
 /// The best corners, at most two even shares a cell and 5 px apart; then the best that are left.
-fn keep_spread(candidates: &[Feature], scores: &[i64], image: &GrayImage, keep: usize) -> Vec<Feature> {
+fn keep_spread(candidates: &[Candidate], image: &GrayImage, keep: usize) -> Vec<Feature> {
+    let worth = |candidate: &Candidate| (candidate.survival as f64 * exp2(-candidate.commonness / 2.0)) as i64;
+    let worths: Vec<i64> = candidates.iter().map(worth).collect();
     let mut order: Vec<usize> = (0..candidates.len()).collect();
-    order.sort_by_key(|&i| std::cmp::Reverse(scores[i]));
+    order.sort_by_key(|&i| std::cmp::Reverse(worths[i]));
     let share = (2 * keep).div_ceil(CELLS[0] * CELLS[1]);
     let mut counts = vec![0; CELLS[0] * CELLS[1]];
     let mut kept: Vec<usize> = Vec::new();
+    let place = |i: usize| candidates[i].feature.position.to_pixels();
     let apart = |a: usize, b: usize| {
-        let [[ax, ay], [bx, by]] = [a, b].map(|i| candidates[i].position.to_pixels());
+        let [[ax, ay], [bx, by]] = [place(a), place(b)];
         (ax - bx) * (ax - bx) + (ay - by) * (ay - by) >= LEAST_DISTANCE * LEAST_DISTANCE
     };
     for &i in &order {
-        let [x, y] = candidates[i].position.to_pixels();
+        let [x, y] = place(i);
         let cell = |p: f32, length: usize, cells: usize| ((p as usize * cells) / length).min(cells - 1);
         let cell = cell(y, image.height, CELLS[1]) * CELLS[0] + cell(x, image.width, CELLS[0]);
         if kept.len() < keep && counts[cell] < share && kept.iter().all(|&other| apart(i, other)) {
@@ -104,8 +168,17 @@ fn keep_spread(candidates: &[Feature], scores: &[i64], image: &GrayImage, keep: 
             kept.push(i);
         }
     }
-    let mut features: Vec<Feature> = kept.into_iter().map(|i| candidates[i]).collect();
+    let mut features: Vec<Feature> = kept.into_iter().map(|i| stored(&candidates[i], image)).collect();
     features.sort_by_key(|feature| (feature.level, feature.position.y, feature.position.x));
     features.dedup_by_key(|feature| (feature.level, feature.position));
     features
+}
+
+/// The candidate as the table keeps it.
+fn stored(candidate: &Candidate, image: &GrayImage) -> Feature {
+    Feature {
+        position: on_grid(candidate.feature.position, image.width as u16, image.height as u16),
+        commonness: libm::round(candidate.commonness) as i8,
+        ..candidate.feature
+    }
 }

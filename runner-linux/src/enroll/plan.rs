@@ -1,0 +1,133 @@
+//! What somebody wants enrolled, and the pictures of it, read by many threads in a fixed order.
+
+use std::fmt;
+use std::path::PathBuf;
+
+use daymark_core::profile::Profile;
+use daymark_core::table::{GeoPosition, Kind, LANDMARK_BYTES, encode_landmark};
+use rayon::prelude::*;
+
+use super::{TooFewCorners, position, view};
+use crate::engine::FRAME_SIDE;
+use crate::picture::{GrayImage, PictureError, Reason, read_gray};
+use crate::table_file::ViewEntry;
+
+/// Failures that are told at once, at most.
+const FAILURES_TOLD: usize = 10;
+
+/// One building to enroll.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Plan {
+    /// Its name in the table.
+    pub name: String,
+    /// What sort of thing it is, if it is said.
+    pub kind: Option<Kind>,
+    /// Where it stands, if it is said.
+    pub position: Option<GeoPosition>,
+    /// Its pictures.
+    pub images: Vec<PathBuf>,
+    /// Where the plan stands, to begin a message with; empty for the command line.
+    pub origin: String,
+}
+
+/// A picture that is read and fit to be a view.
+#[derive(Debug)]
+pub struct Picture {
+    /// The file.
+    pub path: PathBuf,
+    /// Its pixels, shrunk to [`FRAME_SIDE`].
+    pub gray: GrayImage,
+    /// What the table stores of it.
+    pub view: ViewEntry,
+    /// Where the camera stood, if the file says so.
+    pub camera: Option<GeoPosition>,
+}
+
+/// Whether a table can hold this name; if not, why.
+///
+/// # Errors
+/// The reason, and what to do.
+pub fn check_name(name: &str) -> Result<(), String> {
+    match encode_landmark(name, Kind::default(), None, &mut [0; LANDMARK_BYTES]) {
+        Ok(_) => Ok(()),
+        Err(error) => Err(format!("{error}; give another name")),
+    }
+}
+
+/// Reads the pictures of all plans in the threads of the current pool. The result does not depend on their number.
+/// `done` is called after each picture.
+///
+/// # Errors
+/// [`PicturesError`]: all pictures that cannot be enrolled.
+pub fn read_pictures(
+    plans: &[Plan],
+    profile: Profile,
+    done: &(dyn Fn() + Sync),
+) -> Result<Vec<Vec<Picture>>, PicturesError> {
+    let all: Vec<(&Plan, &PathBuf)> =
+        plans.iter().flat_map(|plan| plan.images.iter().map(move |path| (plan, path))).collect();
+    // A path that is wrong is told before minutes of work.
+    let missing = |(plan, path): &(&Plan, &PathBuf)| {
+        let error = std::fs::metadata(path).err()?;
+        let error = PictureError { path: (*path).clone(), reason: Reason::Io(error.to_string()) };
+        Some(format!("{}{error}; correct the path", plan.origin))
+    };
+    PicturesError::of(all.iter().filter_map(missing).collect(), all.len())?;
+
+    let results: Vec<Result<Picture, String>> = all
+        .par_iter()
+        .map(|(plan, path)| {
+            let picture = read_picture(path, profile).map_err(|says| format!("{}{says}", plan.origin));
+            done();
+            picture
+        })
+        .collect();
+    let (mut pictures, mut failures) = (Vec::new(), Vec::new());
+    for result in results {
+        match result {
+            Ok(picture) => pictures.push(picture),
+            Err(failure) => failures.push(failure),
+        }
+    }
+    PicturesError::of(failures, all.len())?;
+    let mut pictures = pictures.into_iter();
+    Ok(plans.iter().map(|plan| pictures.by_ref().take(plan.images.len()).collect()).collect())
+}
+
+fn read_picture(path: &PathBuf, profile: Profile) -> Result<Picture, String> {
+    let gray = read_gray(path).map_err(|error| error.to_string())?.shrunk_to(FRAME_SIDE);
+    let says = |error: TooFewCorners| format!("the picture {} cannot be enrolled: {error}", path.display());
+    let view = view(&gray, profile).map_err(says)?;
+    Ok(Picture { path: path.clone(), gray, view, camera: position::of_camera(path) })
+}
+
+/// Pictures that cannot be enrolled. Nothing was written.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct PicturesError {
+    failures: Vec<String>,
+    pictures: usize,
+}
+
+impl PicturesError {
+    fn of(failures: Vec<String>, pictures: usize) -> Result<(), Self> {
+        if failures.is_empty() { Ok(()) } else { Err(Self { failures, pictures }) }
+    }
+}
+
+impl fmt::Display for PicturesError {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.failures.as_slice() {
+            [only] => out.write_str(only)?,
+            failures => {
+                write!(out, "{} of {} pictures cannot be enrolled:", failures.len(), self.pictures)?;
+                failures.iter().take(FAILURES_TOLD).try_for_each(|failure| write!(out, "\n  {failure}"))?;
+                if let Some(more @ 1..) = failures.len().checked_sub(FAILURES_TOLD) {
+                    write!(out, "\n  and {more} more")?;
+                }
+            }
+        }
+        write!(out, "{}Nothing was enrolled", if self.failures.len() == 1 { ". " } else { "\n" })
+    }
+}
+
+impl std::error::Error for PicturesError {}

@@ -1,0 +1,60 @@
+//! What a round gave.
+
+use daymark_core::image::FrameError;
+use daymark_core::table::{EncodeError, StreamError, TableError};
+use daymark_core::verdict::Recognition;
+
+/// The answers of both readers, which must be the same.
+#[derive(Clone, Copy)]
+pub struct Outcome {
+    /// From the table in place.
+    pub in_place: Recognition,
+    /// From the streamed table.
+    pub streamed: Recognition,
+    /// Stored corners that had something to say.
+    pub explained: usize,
+    /// Bytes of the best landmark's name.
+    pub name_bytes: usize,
+}
+
+/// Why there is no outcome.
+#[derive(Clone, Copy)]
+pub enum Failure {
+    /// The frame.
+    Frame(FrameError),
+    /// The table.
+    Table(TableError),
+    /// The stream of the table.
+    Stream,
+    /// Writing the table.
+    Encode(EncodeError),
+    /// The flash pages are full.
+    Full,
+}
+
+impl From<FrameError> for Failure {
+    fn from(error: FrameError) -> Self {
+        Self::Frame(error)
+    }
+}
+
+impl From<TableError> for Failure {
+    fn from(error: TableError) -> Self {
+        Self::Table(error)
+    }
+}
+
+impl<E> From<StreamError<E>> for Failure {
+    fn from(error: StreamError<E>) -> Self {
+        match error {
+            StreamError::Table(error) => Self::Table(error),
+            _ => Self::Stream,
+        }
+    }
+}
+
+impl From<EncodeError> for Failure {
+    fn from(error: EncodeError) -> Self {
+        Self::Encode(error)
+    }
+}

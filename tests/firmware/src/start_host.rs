@@ -1,0 +1,73 @@
+//! The start on a host: the C library calls `main`. It measures the stack and says how the round went.
+
+use core::ffi::{c_char, c_int};
+use core::ptr;
+
+use daymark_core::verdict::Verdict;
+
+use crate::device::Device;
+
+#[link(name = "c")]
+unsafe extern "C" {
+    fn printf(format: *const c_char, ...) -> c_int;
+}
+
+/// Bytes of stack that are watched.
+const WATCHED: usize = 256 * 1_024;
+/// What an untouched byte of the stack holds.
+const PAINT: u8 = 0xA5;
+
+/// 0 if the program recognizes what it enrolled.
+#[unsafe(no_mangle)]
+extern "C" fn main(_: c_int, _: *const *const c_char) -> c_int {
+    // SAFETY: once.
+    let mut device = unsafe { Device::take() };
+    device.expose();
+    let bottom = paint();
+    let outcome = crate::run(&device);
+    let stack = used(bottom);
+    device.report(outcome);
+    let Ok(outcome) = outcome else {
+        // SAFETY: a string without arguments.
+        unsafe { printf(c"the round failed\n".as_ptr()) };
+        return 1;
+    };
+    let known = matches!(outcome.in_place.verdict, Verdict::Known(_));
+    let same = outcome.in_place == outcome.streamed;
+    // SAFETY: the format has two numbers and three integers.
+    unsafe {
+        printf(
+            c"the round: known %d, both readers agree %d, corners in the frame %d, explained %d, stack %zu bytes\n".as_ptr(),
+            c_int::from(known),
+            c_int::from(same),
+            outcome.in_place.corners as c_int,
+            outcome.explained as c_int,
+            stack,
+        );
+    }
+    c_int::from(!(known && same && outcome.explained > 0 && outcome.name_bytes > 0 && stack <= 64 * 1_024))
+}
+
+/// Paints the stack below this call, and returns the lowest painted byte.
+#[inline(never)]
+fn paint() -> *mut u8 {
+    let mut here = 0_u8;
+    let top = &raw mut here;
+    // From above down, so that the system extends the stack as it goes; 256 bytes are left to this very call.
+    for depth in 256..WATCHED {
+        // SAFETY: below the stack pointer, in the thread's own stack of megabytes, where nothing lives.
+        unsafe { ptr::write_volatile(top.wrapping_sub(depth), PAINT) };
+    }
+    top.wrapping_sub(WATCHED - 1)
+}
+
+/// Bytes from the deepest that was touched up to the caller.
+#[inline(never)]
+fn used(bottom: *mut u8) -> usize {
+    let mut at = 0;
+    // SAFETY: painted bytes.
+    while at < WATCHED - 256 && unsafe { ptr::read_volatile(bottom.wrapping_add(at)) } == PAINT {
+        at += 1;
+    }
+    WATCHED - 1 - at
+}
