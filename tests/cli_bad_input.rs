@@ -11,13 +11,18 @@ use support::{Ran, Town, fixture, speckle};
 
 /// Enrolls `picture` into a table with two landmarks; it must be refused, and the table stay as it was.
 #[track_caller]
-fn refused_picture(town: &Town, picture: &str, expected: &[&str]) {
+fn refused_for_a_table(town: &Town, picture: &str, expected: &[&str]) {
     let (before, names) = (town.read("town.daymark"), town.names());
     let ran = town.run(&["enroll", "--table", "town.daymark", "--name", "New", "mill.pgm", picture]);
     ran.refused(&[picture, "Nothing was enrolled"]).refused_too(expected);
     assert_eq!(town.read("town.daymark"), before, "the old table is untouched");
     assert_eq!(town.names(), names, "nothing is left behind");
-    // The same file as a frame.
+}
+
+/// The same, and as a frame.
+#[track_caller]
+fn refused_picture(town: &Town, picture: &str, expected: &[&str]) {
+    refused_for_a_table(town, picture, expected);
     let ran = town.run(&["recognize", "--table", "town.daymark", picture]);
     assert_eq!((ran.code, ran.stdout.as_str()), (Some(2), ""), "{ran:#?}");
     assert!(expected.iter().all(|expected| ran.stderr.contains(expected)), "{ran:#?}");
@@ -60,12 +65,15 @@ fn a_picture_that_cannot_be_read_is_refused_with_what_to_do() {
     let town = Town::with_table();
     let tower = image::open(town.path("gate.pgm")).expect("a picture");
 
-    for (name, format) in [("cut.jpg", ImageFormat::Jpeg), ("cut.png", ImageFormat::Png), ("cut.pgm", ImageFormat::Pnm)]
-    {
+    for (name, format) in [("cut.png", ImageFormat::Png), ("cut.pgm", ImageFormat::Pnm)] {
         let bytes = encoded(&tower, format);
         town.write(name, &bytes[..bytes.len() / 3]);
         refused_picture(&town, name, &["is damaged", "save it again as JPEG or PNG"]);
     }
+    // What is left of a JPEG can be shown, and a part of a building be recognized; but a table stores no half.
+    let bytes = encoded(&tower, ImageFormat::Jpeg);
+    town.write("cut.jpg", &bytes[..bytes.len() / 3]);
+    refused_for_a_table(&town, "cut.jpg", &["is damaged", "its end is missing", "save it again as JPEG or PNG"]);
     town.write("header.png", &encoded(&tower, ImageFormat::Png)[..20]);
     refused_picture(&town, "header.png", &["is damaged"]);
     town.write("empty.jpg", "");
@@ -158,9 +166,9 @@ fn a_table_that_is_no_sound_table_is_refused_and_kept() {
     let names = town.names().len();
 
     town.write("cut.daymark", &sound[..sound.len() - 1]);
-    refused_table(&town, "cut.daymark", &["ends after", "restore the table from a copy"]);
+    refused_table(&town, "cut.daymark", &["cut short", "restore the table from a copy"]);
     town.write("stub.daymark", &sound[..20]);
-    refused_table(&town, "stub.daymark", &["ends after 20"]);
+    refused_table(&town, "stub.daymark", &["cut short", "20 of 40 bytes"]);
     town.write("long.daymark", [sound.as_slice(), b"\n"].concat());
     refused_table(&town, "long.daymark", &["ends after"]);
     town.write("empty.daymark", "");
@@ -220,7 +228,7 @@ fn a_missing_table_is_refused_where_one_is_needed() {
         ["recognize", "--table", "missing.daymark", "mill.pgm"].as_slice(),
         &["table", "list", "missing.daymark"],
         &["table", "verify", "missing.daymark"],
-        &["table", "merge", "town.daymark", "missing.daymark"],
+        &["table", "merge", "all.daymark", "town.daymark", "missing.daymark"],
     ] {
         town.run(command).refused(&["cannot read missing.daymark", "enroll a landmark first"]);
     }

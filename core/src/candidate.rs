@@ -15,11 +15,11 @@ const FREE_BITS: i32 = 5;
 /// A single corner cannot gain more than this.
 const MOST_BITS: i32 = 12;
 /// Distances up to this have a gain, for the least common corner.
-const FARTHEST: u8 = farthest();
+const FARTHEST: u8 = farthest_of_all();
 /// Neighbours whose distance is within this count as equally near.
 const TIE: u8 = 4;
 
-const fn farthest() -> u8 {
+const fn farthest_of_all() -> u8 {
     let mut distance = 0;
     while SURPRISE[distance as usize + 1] as i32 > 8 * (FREE_BITS + *COMMONNESS.start() as i32) {
         distance += 1;
@@ -37,6 +37,15 @@ pub fn surprise(distance: u8) -> u8 {
 pub fn gain(distance: u8, commonness: i8) -> i32 {
     let free = (FREE_BITS + i32::from(commonness)) * GAIN_UNIT;
     (i32::from(surprise(distance)) * (GAIN_UNIT / 8) - free).clamp(0, MOST_BITS * GAIN_UNIT)
+}
+
+/// The largest distance to a corner of this commonness that has a gain.
+pub fn farthest(commonness: i8) -> u8 {
+    let mut distance = FARTHEST;
+    while distance > 0 && gain(distance, commonness) == 0 {
+        distance -= 1;
+    }
+    distance
 }
 
 /// `gain / sqrt(n)` for 1, 2 or 3 neighbours that are equally near: a soft ratio test that keeps repeated windows.

@@ -38,7 +38,7 @@ pub type HandheldExtractor = Extractor<STRIP, { HANDHELD_FRONT_END.slots() }>;
 pub type HandheldFeatures = FeatureSet<HANDHELD_FEATURES>;
 
 /// Recognizes [`HandheldFeatures`] by a table of [`Profile::Handheld`].
-pub type HandheldRecognizer = Recognizer<STORED, { 2 * STORED }, HANDHELD_FEATURES>;
+pub type HandheldRecognizer = Recognizer<STORED, { 2 * STORED }, 0, HANDHELD_FEATURES>;
 
 /// Bytes of memory on the processor that this is compiled for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -86,6 +86,7 @@ pub const fn slots(share: usize) -> usize {
 impl<const STRIP: usize, const SLOTS: usize> CornerDetector<STRIP, SLOTS> {
     /// A detector without an image yet.
     pub const fn new() -> Self {
+        const { assert!(ResponseRows::<STRIP>::MAX_COLUMNS > 2 * PEAK_REACH, "no column is left between the halos") };
         Self { rows: ResponseRows::new(), flags: [0; STRIP], spread: Spread::new() }
     }
 
@@ -118,9 +119,9 @@ impl<const STRIP: usize, const SLOTS: usize> CornerDetector<STRIP, SLOTS> {
     fn sweep<K: Kernels>(&mut self, kernels: &K, level: GrayView<'_>, first: usize, end: usize) {
         let columns = end - first + 2 * PEAK_REACH;
         self.rows.start(columns);
-        for latest in 0..level.height() {
-            let pixels = level.row(latest).get(first - BORDER..end + BORDER).unwrap_or(&[]);
-            if !self.rows.push(kernels, pixels) {
+        let pixels = |y: usize| level.row(y).get(first - BORDER..end + BORDER).unwrap_or(&[]);
+        for latest in 2..level.height() {
+            if !self.rows.push(kernels, [pixels(latest - 2), pixels(latest - 1), pixels(latest)]) {
                 continue;
             }
             let Some(near) = self.rows.neighbourhood() else { continue };
@@ -128,10 +129,8 @@ impl<const STRIP: usize, const SLOTS: usize> CornerDetector<STRIP, SLOTS> {
             let Some(flags) = self.flags.get_mut(..columns) else { continue };
             kernels.peak_flags([near[2], near[3], near[4]], flags);
             // The outer columns belong to the neighbouring strips.
-            for edge in 0..PEAK_REACH {
-                flags[edge] = 0;
-                flags[columns - 1 - edge] = 0;
-            }
+            flags.iter_mut().take(PEAK_REACH).for_each(|flag| *flag = 0);
+            flags.iter_mut().rev().take(PEAK_REACH).for_each(|flag| *flag = 0);
             self.spread.start_row(row);
             for at in marked(flags) {
                 let Some(&response) = near[3].get(at) else { continue };

@@ -3,6 +3,7 @@
 use heapless::Vec;
 
 use crate::candidate::{GAIN_UNIT, surprise};
+use crate::kernel::Kernels;
 use crate::math::{self, log2_q8};
 use crate::model::EVIDENCE;
 use crate::pyramid::scale;
@@ -60,7 +61,8 @@ pub struct CornerEvidence {
 /// of the frame's `n` corners elsewhere are nearer than `d`. The rank devalues windows that match everywhere. The
 /// table [`EVIDENCE`] turns `a` and `b` into bits. A query corner supports one stored corner only. The sum over each
 /// of 6 x 6 cells of the view saturates, so that one sign or tree cannot carry the answer.
-pub fn weigh<const QUERY: usize, const CORNERS: usize>(
+pub fn weigh<K: Kernels, const QUERY: usize, const CORNERS: usize>(
+    kernels: &K,
     pairing: &Pairing<'_, QUERY>,
     refined: &Refined,
     corners: &mut Vec<CornerEvidence, CORNERS>,
@@ -94,7 +96,7 @@ pub fn weigh<const QUERY: usize, const CORNERS: usize>(
         }
         let (distance, query) = best;
         let near_bits = log2_q8(near);
-        let rank_bits = log2_q8(1 + rank(pairing, row, distance, query));
+        let rank_bits = log2_q8(1 + rank(kernels, pairing, row, distance, query));
         let surprise = i32::from(surprise(distance)) * 32;
         let a = ((surprise - near_bits - i32::from(commonness) * 256) >> 8).clamp(0, 15) as usize;
         let b = ((count_bits - rank_bits - near_bits) >> 8).clamp(0, 9) as usize;
@@ -106,8 +108,14 @@ pub fn weigh<const QUERY: usize, const CORNERS: usize>(
 }
 
 /// Corners of the frame that are nearer in signature and lie elsewhere: farther than the radius from the match.
-fn rank<const QUERY: usize>(pairing: &Pairing<'_, QUERY>, row: &[u8], distance: u8, query: u16) -> u32 {
-    let nearer = row.iter().filter(|&&other| other < distance).count() as u32;
+fn rank<K: Kernels, const QUERY: usize>(
+    kernels: &K,
+    pairing: &Pairing<'_, QUERY>,
+    row: &[u8],
+    distance: u8,
+    query: u16,
+) -> u32 {
+    let nearer = kernels.count_below(row, distance);
     let Some(place) = pairing.query.positions.get(usize::from(query)) else { return nearer };
     let mut here = 0;
     pairing.index.within(place.to_pixels(), RADIUS, |other, _, _| {

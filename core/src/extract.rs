@@ -2,11 +2,12 @@
 
 use crate::corner::{CELLS, CornerDetector, slots};
 use crate::feature::{Feature, Signature};
-use crate::image::{FrameError, GrayView};
+use crate::image::FrameError;
 use crate::kernel::Kernels;
 use crate::point::ImagePoint;
 use crate::pyramid::{LEVELS, base_from_level, level_bytes, visit_levels};
 use crate::signature::{SignatureScratch, describe};
+use crate::tone::TonedFrame;
 
 /// How many features, and how evenly they are spread.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -176,11 +177,12 @@ impl<const STRIP: usize, const SLOTS: usize> Extractor<STRIP, SLOTS> {
     pub fn extract<K: Kernels, const FEATURES: usize>(
         &mut self,
         kernels: &K,
-        frame: GrayView<'_>,
+        frame: TonedFrame<'_>,
         front_end: FrontEnd,
         levels: &mut [u8],
         features: &mut FeatureSet<FEATURES>,
     ) -> Result<(), FrameError> {
+        let frame = frame.view();
         features.reset(frame.width() as u16, frame.height() as u16);
         let Self { detector, scratch } = self;
         visit_levels(kernels, frame, levels, |number, level| {
@@ -202,12 +204,12 @@ impl<const STRIP: usize, const SLOTS: usize> Extractor<STRIP, SLOTS> {
     pub fn count_corners<K: Kernels>(
         &mut self,
         kernels: &K,
-        frame: GrayView<'_>,
+        frame: TonedFrame<'_>,
         front_end: FrontEnd,
         levels: &mut [u8],
     ) -> Result<[usize; LEVELS], FrameError> {
         let mut counts = [0; LEVELS];
-        visit_levels(kernels, frame, levels, |number, level| {
+        visit_levels(kernels, frame.view(), levels, |number, level| {
             let number = usize::from(number);
             self.detector.detect(kernels, level, front_end.level_count(number), front_end.cell_share(number), |_| {
                 if let Some(count) = counts.get_mut(number) {

@@ -60,6 +60,14 @@ pub trait Kernels {
     fn count_below(&self, values: &[u8], limit: u8) -> u32 {
         count_below(values, limit)
     }
+    /// See [`each_at_most`].
+    fn each_at_most(&self, values: &[u8], limit: u8, found: &mut dyn FnMut(usize)) {
+        each_at_most(values, limit, found);
+    }
+    /// See [`closest`].
+    fn closest(&self, entries: ShortColumns<'_>, search: Search) -> i32 {
+        closest(entries, search)
+    }
     /// See [`nearest_three`].
     fn nearest_three(&self, row: &[u8], limit: u8) -> Nearest {
         nearest_three(row, limit)
@@ -113,22 +121,32 @@ fn pair(chunk: &[u8]) -> [u16; 2] {
     }
 }
 
-/// The tone curve under which corners are detected: close to `16 sqrt(gray)`, so that a corner in the dark counts as
-/// much as one in the light (photon noise grows with the root of the intensity).
-///
-/// It is the least of the six tangents of `16 sqrt(v)` at 1/4, 1, 4, 16, 64 and 256, `2^k v + 2^(6 - k)`: concave,
-/// within 7 % of the root, and nothing but saturating additions.
+/// One row under the tone curve of [`tone`].
 #[inline(always)]
 pub fn tone_row(row: &[u8], out: &mut [u8]) {
-    for (&v, out) in row.iter().zip(out) {
-        let v2 = v.saturating_add(v);
-        let v4 = v2.saturating_add(v2);
-        let v8 = v4.saturating_add(v4);
-        let v16 = v8.saturating_add(v8);
-        let dark = v16.saturating_add(4).min(v8.saturating_add(8)).min(v4.saturating_add(16));
-        let bright = v2.saturating_add(32).min(v.saturating_add(64)).min((v >> 1).saturating_add(128));
-        *out = dark.min(bright);
+    for (&gray, out) in row.iter().zip(out) {
+        *out = tone(gray);
     }
+}
+
+/// The tone curve, close to `16 sqrt(gray)`.
+///
+/// It is the least of the six tangents of `16 sqrt(v)` at 1/4, 1, 4, 16, 64 and 256, `2^k v + 2^(6 - k)`: concave,
+/// within 7 % of the root (and 4 at black), and nothing but saturating additions.
+#[inline(always)]
+pub const fn tone(gray: u8) -> u8 {
+    let v2 = gray.saturating_add(gray);
+    let v4 = v2.saturating_add(v2);
+    let v8 = v4.saturating_add(v4);
+    let v16 = v8.saturating_add(v8);
+    let dark = least(least(v16.saturating_add(4), v8.saturating_add(8)), v4.saturating_add(16));
+    let bright = least(least(v2.saturating_add(32), gray.saturating_add(64)), (gray >> 1).saturating_add(128));
+    least(dark, bright)
+}
+
+#[inline(always)]
+const fn least(a: u8, b: u8) -> u8 {
+    if a < b { a } else { b }
 }
 
 /// One row of the structure tensor, smoothed along the row.
@@ -297,6 +315,80 @@ pub fn nearest_three(row: &[u8], limit: u8) -> Nearest {
         }
     }
     nearest
+}
+
+/// Calls `found` with the place of every value of at most `limit`, in order.
+#[inline(always)]
+pub fn each_at_most(values: &[u8], limit: u8, found: &mut dyn FnMut(usize)) {
+    for (number, chunk) in values.chunks(64).enumerate() {
+        let mut marks = 0_u64;
+        for (bit, &value) in chunk.iter().enumerate() {
+            marks |= u64::from(value <= limit) << bit;
+        }
+        while marks != 0 {
+            found(number * 64 + marks.trailing_zeros() as usize);
+            marks &= marks - 1;
+        }
+    }
+}
+
+/// Corners of the frame that look like one stored corner, as columns of equal length.
+#[derive(Debug, Clone, Copy)]
+pub struct ShortColumns<'a> {
+    /// x in the frame, px.
+    pub x: &'a [f32],
+    /// y in the frame, px.
+    pub y: &'a [f32],
+    /// Gain in 1/64 bit.
+    pub gain: &'a [i32],
+    /// The corner's level, as the bit of that number.
+    pub level: &'a [i32],
+    /// The corner's number.
+    pub number: &'a [i32],
+}
+
+/// A place to search around, in the frame.
+#[derive(Debug, Clone, Copy)]
+pub struct Search {
+    /// The place, px.
+    pub at: [f32; 2],
+    /// Square of the radius, px².
+    pub radius_squared: f32,
+    /// The levels that fit, a bit each.
+    pub levels: i32,
+}
+
+/// Weight of a corner at a squared distance of `squared` px² from where it is searched: gain times closeness,
+/// `gain * round(1024 (1 - squared / (1.2 radius²)))`, and below it the corner's number, the lower the larger. At most
+/// 768 * 1,024 * 2^11 < 2^31.
+///
+/// The larger key wins, whatever the order in which corners are looked at. `0` stands for none.
+#[inline(always)]
+pub fn search_key(search: Search, squared: f32, gain: i32, level: i32, number: i32) -> i32 {
+    /// Adding 2^23 leaves the rounded integer in the low bits of an `f32`: a cast that vectorizes.
+    const TO_INTEGER: f32 = 8_388_608.0;
+    let closeness = 1_024.0 * (1.0 - squared / (1.2 * search.radius_squared));
+    let closeness = ((closeness + TO_INTEGER).to_bits() & 0x7ff) as i32;
+    let fits = (squared <= search.radius_squared) & (level & search.levels != 0) & (gain > 0);
+    let key = gain.wrapping_mul(closeness) << NUMBER_BITS | (NUMBER_LIMIT - number);
+    if fits { key } else { 0 }
+}
+
+/// Bits of a corner's number in a [`search_key`].
+pub const NUMBER_BITS: u32 = 11;
+/// Corners of a frame have numbers up to this.
+pub const NUMBER_LIMIT: i32 = (1 << NUMBER_BITS) - 1;
+
+/// The largest [`search_key`] of the entries.
+#[inline(always)]
+pub fn closest(entries: ShortColumns<'_>, search: Search) -> i32 {
+    let ShortColumns { x, y, gain, level, number } = entries;
+    let places = x.iter().zip(y).zip(gain.iter().zip(level)).zip(number);
+    places.fold(0, |best, (((&x, &y), (&gain, &level)), &number)| {
+        let [dx, dy] = [x - search.at[0], y - search.at[1]];
+        let key = search_key(search, dx * dx + dy * dy, gain, level, number);
+        if key > best { key } else { best }
+    })
 }
 
 /// Candidate correspondences as columns of equal length.

@@ -8,6 +8,7 @@ use crate::extract::Features;
 use crate::hypothesis::{Hypotheses, HypothesisSource, SignatureVotes};
 use crate::kernel::Kernels;
 use crate::query::QueryIndex;
+use crate::shortlist::Shortlist;
 use crate::refine::{Pairing, Refined, refine};
 use crate::transform::{Homography, Shape, WeightedPair};
 
@@ -31,9 +32,11 @@ pub struct ViewMatch {
     pub supporting_corners: u16,
 }
 
-/// Working memory for views of at most `STORED` corners.
+/// Working memory for views of at most `STORED` corners; `ENTRIES` places for look-alikes make it faster and change
+/// nothing else.
 #[derive(Debug, Clone)]
-pub struct Matcher<const STORED: usize, const CANDIDATES: usize> {
+pub struct Matcher<const STORED: usize, const CANDIDATES: usize, const ENTRIES: usize> {
+    shortlist: Shortlist<ENTRIES>,
     candidates: Candidates<CANDIDATES>,
     votes: SignatureVotes<CANDIDATES>,
     pairs: Vec<WeightedPair, CANDIDATES>,
@@ -41,11 +44,12 @@ pub struct Matcher<const STORED: usize, const CANDIDATES: usize> {
     best_corners: Vec<CornerEvidence, STORED>,
 }
 
-impl<const STORED: usize, const CANDIDATES: usize> Matcher<STORED, CANDIDATES> {
+impl<const STORED: usize, const CANDIDATES: usize, const ENTRIES: usize> Matcher<STORED, CANDIDATES, ENTRIES> {
     /// Working memory; nothing depends on what was matched before.
     pub const fn new() -> Self {
         const { assert!(CANDIDATES >= STORED, "every stored corner may become a pair") };
         Self {
+            shortlist: Shortlist::new(),
             candidates: Candidates::new(),
             votes: SignatureVotes::new(),
             pairs: Vec::new(),
@@ -78,10 +82,13 @@ impl<const STORED: usize, const CANDIDATES: usize> Matcher<STORED, CANDIDATES> {
         let view_size = [f32::from(stored.width), f32::from(stored.height)];
         self.votes.propose(kernels, self.candidates.view(), view_size, &mut hypotheses);
         let pairing = Pairing { stored, query, index, distances };
+        self.shortlist.fill(kernels, &pairing);
         let mut best: Option<ViewMatch> = None;
         for hypothesis in hypotheses.iter() {
-            let Some(refined) = refine(&pairing, self.candidates.view(), hypothesis, &mut self.pairs) else { continue };
-            let corner_evidence = weigh(&pairing, &refined, &mut self.corners);
+            let candidates = self.candidates.view();
+            let refined = refine(kernels, &pairing, &self.shortlist, candidates, hypothesis, &mut self.pairs);
+            let Some(refined) = refined else { continue };
+            let corner_evidence = weigh(kernels, &pairing, &refined, &mut self.corners);
             let supporting_corners = self.corners.iter().filter(|corner| corner.evidence > 0).count() as u16;
             let Refined { frame_from_view, shape, .. } = refined;
             let evidence = total(corner_evidence, supporting_corners, hypothesis.support, shape);
@@ -101,7 +108,9 @@ impl<const STORED: usize, const CANDIDATES: usize> Matcher<STORED, CANDIDATES> {
     }
 }
 
-impl<const STORED: usize, const CANDIDATES: usize> Default for Matcher<STORED, CANDIDATES> {
+impl<const STORED: usize, const CANDIDATES: usize, const ENTRIES: usize> Default
+    for Matcher<STORED, CANDIDATES, ENTRIES>
+{
     fn default() -> Self {
         Self::new()
     }

@@ -22,8 +22,9 @@ pub fn scale(level: u8) -> f32 {
 
 /// Bytes of scratch memory for the levels of a `width` x `height` frame: those of level 1 or level 2.
 pub const fn level_bytes(width: usize, height: usize) -> usize {
-    let one = (width * 5 / 7) * (height * 5 / 7);
-    let two = (width / 2) * (height / 2);
+    // No product of sides that a frame may have overflows; of larger ones no such memory exists.
+    let one = (width.saturating_mul(5) / 7).saturating_mul(height.saturating_mul(5) / 7);
+    let two = (width / 2).saturating_mul(height / 2);
     if one > two { one } else { two }
 }
 
@@ -76,9 +77,12 @@ const ROWS: [(usize, [u16; 3]); 5] = [(0, [5, 2, 0]), (1, [3, 4, 0]), (2, [1, 5,
 /// outputs as fit.
 fn shrink_seven_to_five<K: Kernels>(kernels: &K, frame: GrayView<'_>, out: &mut [u8]) -> (usize, usize) {
     let (width, height) = (frame.width() * 5 / 7, frame.height() * 5 / 7);
+    if width == 0 {
+        return (0, height);
+    }
     let whole = frame.width() / 7 * 7;
     let rest = frame.width() - whole;
-    for (y, out) in out.chunks_exact_mut(width.max(1)).take(height).enumerate() {
+    for (y, out) in out.chunks_exact_mut(width).take(height).enumerate() {
         let (first, weights) = ROWS.get(y % 5).copied().unwrap_or_default();
         let first = y / 5 * 7 + first;
         // A row of weight 0 may lie below the frame: any row of the right length will do.
@@ -108,7 +112,10 @@ fn shrink_seven_to_five<K: Kernels>(kernels: &K, frame: GrayView<'_>, out: &mut 
 /// Writes the 2 x 2 averages of the frame and returns their size.
 fn halve<K: Kernels>(kernels: &K, frame: GrayView<'_>, out: &mut [u8]) -> (usize, usize) {
     let (width, height) = (frame.width() / 2, frame.height() / 2);
-    for (y, out) in out.chunks_exact_mut(width.max(1)).take(height).enumerate() {
+    if width == 0 {
+        return (0, height);
+    }
+    for (y, out) in out.chunks_exact_mut(width).take(height).enumerate() {
         kernels.halve(frame.row(2 * y), frame.row(2 * y + 1), out);
     }
     (width, height)

@@ -12,13 +12,13 @@ use crate::verdict::{Calibration, FalseAnswer, LEAST_CORNERS, Ranking, Recogniti
 ///
 /// The distances of one view to the frame need `STORED * QUERY` bytes more, which the caller lends.
 #[derive(Debug, Clone)]
-pub struct Recognizer<const STORED: usize, const CANDIDATES: usize, const QUERY: usize> {
-    matcher: Matcher<STORED, CANDIDATES>,
+pub struct Recognizer<const STORED: usize, const CANDIDATES: usize, const ENTRIES: usize, const QUERY: usize> {
+    matcher: Matcher<STORED, CANDIDATES, ENTRIES>,
     index: QueryIndex<QUERY>,
     stored: FeatureSet<STORED>,
 }
 
-impl<const STORED: usize, const CANDIDATES: usize, const QUERY: usize> Recognizer<STORED, CANDIDATES, QUERY> {
+impl<const STORED: usize, const CANDIDATES: usize, const ENTRIES: usize, const QUERY: usize> Recognizer<STORED, CANDIDATES, ENTRIES, QUERY> {
     /// Bytes of distances of the largest view to the largest frame.
     pub const DISTANCE_BYTES: usize = STORED * QUERY;
 
@@ -87,8 +87,8 @@ impl<const STORED: usize, const CANDIDATES: usize, const QUERY: usize> Recognize
     }
 }
 
-impl<const STORED: usize, const CANDIDATES: usize, const QUERY: usize> Default
-    for Recognizer<STORED, CANDIDATES, QUERY>
+impl<const STORED: usize, const CANDIDATES: usize, const ENTRIES: usize, const QUERY: usize> Default
+    for Recognizer<STORED, CANDIDATES, ENTRIES, QUERY>
 {
     fn default() -> Self {
         Self::new()

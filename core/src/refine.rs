@@ -5,9 +5,10 @@ use heapless::Vec;
 use crate::candidate::{CandidateView, GAIN_UNIT, gain};
 use crate::extract::Features;
 use crate::hypothesis::Hypothesis;
-use crate::kernel::{SLACK, SLACK_PER_PIXEL};
+use crate::kernel::{Kernels, NUMBER_BITS, NUMBER_LIMIT, SLACK, SLACK_PER_PIXEL, Search, search_key};
 use crate::pyramid::{LEVELS, scale};
 use crate::query::QueryIndex;
+use crate::shortlist::Shortlist;
 use crate::transform::{Homography, Normalization, Shape, WeightedPair, fit_affine, fit_homography};
 
 /// Search radius of each round, in pixels.
@@ -76,8 +77,10 @@ pub struct Refined {
 /// Refines a hypothesis; `None` if it loses its pairs or becomes a map that no camera sees.
 ///
 /// `pairs` is working memory. Cost: four rounds of one lookup for each stored corner.
-pub fn refine<const QUERY: usize, const PAIRS: usize>(
+pub fn refine<K: Kernels, const QUERY: usize, const ENTRIES: usize, const PAIRS: usize>(
+    kernels: &K,
     pairing: &Pairing<'_, QUERY>,
+    shortlist: &Shortlist<ENTRIES>,
     candidates: CandidateView<'_>,
     hypothesis: &Hypothesis,
     pairs: &mut Vec<WeightedPair, PAIRS>,
@@ -87,7 +90,7 @@ pub fn refine<const QUERY: usize, const PAIRS: usize>(
     let mut map_scale = hypothesis.scale;
     let mut refined = None;
     for (round, radius) in RADII.into_iter().enumerate() {
-        guided_pairs(pairing, &map, map_scale, radius, pairs);
+        guided_pairs(kernels, pairing, shortlist, &map, map_scale, radius, pairs);
         if pairs.len() < LEAST_PAIRS {
             return None;
         }
@@ -140,8 +143,10 @@ fn squared_distance(a: [f32; 2], b: [f32; 2]) -> f32 {
 }
 
 /// For every stored corner the query corner within the radius that gains most for its closeness.
-fn guided_pairs<const QUERY: usize, const PAIRS: usize>(
+fn guided_pairs<K: Kernels, const QUERY: usize, const ENTRIES: usize, const PAIRS: usize>(
+    kernels: &K,
     pairing: &Pairing<'_, QUERY>,
+    shortlist: &Shortlist<ENTRIES>,
     map: &Homography,
     map_scale: f32,
     radius: f32,
@@ -149,27 +154,38 @@ fn guided_pairs<const QUERY: usize, const PAIRS: usize>(
 ) {
     pairs.clear();
     let fitting = fitting_levels(map_scale);
-    let fall = 1.0 / (1.2 * radius * radius);
     let corners = pairing.stored.positions.iter().zip(pairing.stored.levels).zip(pairing.stored.commonness);
     for (number, ((position, &level), &commonness)) in corners.enumerate() {
         let from = position.to_pixels();
-        let levels = fitting.get(usize::from(level)).copied().unwrap_or(0);
-        let row = pairing.row(number);
-        let mut best = (0.0, 0);
-        pairing.index.within(map.apply(from), radius, |query, level, squared| {
-            if levels >> level & 1 == 0 {
-                return;
-            }
-            let gain = row.get(usize::from(query)).map_or(0, |&distance| gain(distance, commonness));
-            let weight = gain as f32 * (1.0 - squared * fall);
-            if weight > best.0 {
-                best = (weight, query);
-            }
-        });
-        if let (true, Some(to)) = (best.0 > 0.0, pairing.query.positions.get(usize::from(best.1))) {
-            let weight = best.0 / GAIN_UNIT as f32;
+        let levels = i32::from(fitting.get(usize::from(level)).copied().unwrap_or(0));
+        let search = Search { at: map.apply(from), radius_squared: radius * radius, levels };
+        let best = match shortlist.of(number) {
+            Some(entries) => kernels.closest(entries, search),
+            None => closest_in_grid(pairing, number, commonness, search, radius),
+        };
+        let query = NUMBER_LIMIT - (best & NUMBER_LIMIT);
+        if let (true, Some(to)) = (best > 0, pairing.query.positions.get(query as usize)) {
+            let weight = (best >> NUMBER_BITS) as f32 / (1_024 * GAIN_UNIT) as f32;
             // Working memory holds at least as many pairs as a view has corners.
             let _ = pairs.push(WeightedPair { from, to: to.to_pixels(), weight });
         }
     }
+}
+
+/// What [`Kernels::closest`] finds in a shortlist, from the grid.
+fn closest_in_grid<const QUERY: usize>(
+    pairing: &Pairing<'_, QUERY>,
+    stored: usize,
+    commonness: i8,
+    search: Search,
+    radius: f32,
+) -> i32 {
+    let row = pairing.row(stored);
+    let mut best = 0;
+    pairing.index.within(search.at, radius, |query, level, squared| {
+        let gain = row.get(usize::from(query)).map_or(0, |&distance| gain(distance, commonness));
+        let key = search_key(search, squared, gain, 1 << level, i32::from(query));
+        best = best.max(key);
+    });
+    best
 }

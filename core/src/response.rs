@@ -1,7 +1,7 @@
 //! The Harris response, row by row as the image arrives.
 //!
-//! Tone curve, integer gradients and structure tensor. Three rows of pixels, five of the tensor and seven of the
-//! response are kept, so the memory depends on the width of a strip, not on the image.
+//! Integer gradients and structure tensor. The three newest rows of pixels are looked at, five of the tensor and seven
+//! of the response are kept, so the memory depends on the width of a strip, not on the image.
 
 use crate::kernel::Kernels;
 
@@ -15,18 +15,17 @@ const PRODUCT_HALO: usize = 4;
 /// Pixels that a response looks at in each direction: 1 for the gradient, 2 for the smoothing.
 pub(crate) const REACH: usize = 3;
 
-/// Rolling rows of pixels, tensor and response for a strip of at most `STRIP - 6` columns.
+/// Rolling rows of tensor and response for a strip of at most `STRIP - 6` columns.
 ///
 /// [`ResponseRows::BYTES`] of memory, whatever the height of the image.
 #[derive(Debug, Clone)]
 pub struct ResponseRows<const STRIP: usize> {
-    toned: [[u8; STRIP]; 3],
     products: [[i32; STRIP]; 3],
     tensor: [[[i32; STRIP]; 3]; TENSOR_ROWS],
     response: [[f32; STRIP]; RESPONSE_ROWS],
     /// Columns of the response in the present strip.
     columns: usize,
-    /// Rows of pixels since [`ResponseRows::start`].
+    /// Rows of the tensor since [`ResponseRows::start`].
     pushed: usize,
 }
 
@@ -40,7 +39,6 @@ impl<const STRIP: usize> ResponseRows<STRIP> {
     /// Rolling rows without an image yet.
     pub const fn new() -> Self {
         Self {
-            toned: [[0; STRIP]; 3],
             products: [[0; STRIP]; 3],
             tensor: [[[0; STRIP]; 3]; TENSOR_ROWS],
             response: [[0.0; STRIP]; RESPONSE_ROWS],
@@ -55,22 +53,17 @@ impl<const STRIP: usize> ResponseRows<STRIP> {
         self.pushed = 0;
     }
 
-    /// Takes the next row of pixels: `columns + 6` of them, beginning three columns before the strip. Returns whether a
-    /// row of the response became complete; it belongs to the image row three above.
-    pub fn push<K: Kernels>(&mut self, kernels: &K, row: &[u8]) -> bool {
+    /// Takes the next image row, given with its neighbours above and below: `columns + 6` pixels each, beginning
+    /// three columns before the strip. Returns whether a row of the response became complete; it belongs to the image
+    /// row two above the middle one.
+    pub fn push<K: Kernels>(&mut self, kernels: &K, rows: [&[u8]; 3]) -> bool {
         let n = self.columns;
-        if let Some(toned) = self.toned.get_mut(self.pushed % 3).and_then(|toned| toned.get_mut(..n + PIXEL_HALO)) {
-            kernels.tone_row(row, toned);
-        }
-        self.pushed += 1;
-        let Some(number) = self.pushed.checked_sub(3) else { return false };
-        if let Some(tensor) = self.tensor.get_mut(number % TENSOR_ROWS) {
-            let rows = [number, number + 1, number + 2]
-                .map(|row| self.toned.get(row % 3).and_then(|toned| toned.get(..n + PIXEL_HALO)).unwrap_or(&[]));
+        if let Some(tensor) = self.tensor.get_mut(self.pushed % TENSOR_ROWS) {
             let products = self.products.each_mut().map(|part| part.get_mut(..n + PRODUCT_HALO).unwrap_or_default());
             let out = tensor.each_mut().map(|part| part.get_mut(..n).unwrap_or_default());
             kernels.structure_row(rows, products, out);
         }
+        self.pushed += 1;
         let Some(number) = self.complete().checked_sub(1) else { return false };
         // Oldest tensor row first.
         let mut five: [[&[i32]; 3]; TENSOR_ROWS] = [[&[]; 3]; TENSOR_ROWS];
@@ -87,7 +80,7 @@ impl<const STRIP: usize> ResponseRows<STRIP> {
 
     /// Rows of the response that are complete.
     pub const fn complete(&self) -> usize {
-        self.pushed.saturating_sub(2 * REACH)
+        self.pushed.saturating_sub(TENSOR_ROWS - 1)
     }
 
     /// The latest seven rows of the response, oldest first; `None` until seven are complete.

@@ -176,7 +176,7 @@ impl Ranking {
             None => Verdict::Unknown(NoAnswer::NothingFits),
             Some(best) if !passes(&best) => Verdict::Unknown(NoAnswer::NotSure(best)),
             Some(best) => {
-                let close = |other: &Answer| best.matched.evidence - other.matched.evidence < AMBIGUOUS_WITHIN;
+                let close = |other: &Answer| best.matched.evidence.saturating_sub(other.matched.evidence) < AMBIGUOUS_WITHIN;
                 match runner_up.filter(|other| passes(other) && close(other)) {
                     Some(other) => Verdict::Ambiguous(best, other),
                     None => Verdict::Known(best),

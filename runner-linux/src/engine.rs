@@ -8,6 +8,7 @@ use daymark_core::profile::Profile;
 use daymark_core::pyramid::level_bytes;
 use daymark_core::recognizer::Recognizer;
 use daymark_core::table::{StoredView, ViewSource};
+use daymark_core::tone::TonedFrame;
 use daymark_core::verdict::{FalseAnswer, Recognition};
 
 use crate::enroll::select::Selection;
@@ -40,8 +41,8 @@ pub const QUERY_FEATURES: usize = 800;
 const STRIP: usize = 256;
 const SLOTS: usize = selection(Profile::Handheld).query.slots();
 
-type HandheldRecognizer = Recognizer<100, 200, QUERY_FEATURES>;
-type BoardRecognizer = Recognizer<800, 800, QUERY_FEATURES>;
+type HandheldRecognizer = Recognizer<100, 200, 8_192, QUERY_FEATURES>;
+type BoardRecognizer = Recognizer<800, 800, 32_768, QUERY_FEATURES>;
 
 #[derive(Debug)]
 enum AnyRecognizer {
@@ -56,6 +57,7 @@ pub struct Engine {
     profile: Profile,
     extractor: Box<Extractor<STRIP, SLOTS>>,
     features: Box<FeatureSet<QUERY_FEATURES>>,
+    toned: Vec<u8>,
     levels: Vec<u8>,
     recognizer: AnyRecognizer,
     distances: Vec<u8>,
@@ -79,6 +81,7 @@ impl Engine {
             profile,
             extractor: Box::default(),
             features: Box::default(),
+            toned: Vec::new(),
             levels: Vec::new(),
             recognizer,
             distances: vec![0; distances],
@@ -97,10 +100,12 @@ impl Engine {
     /// [`FrameError`] for a frame beyond core's limits.
     pub fn extract(&mut self, frame: &GrayImage) -> Result<(), FrameError> {
         self.levels.resize(level_bytes(frame.width, frame.height), 0);
+        self.toned.resize(frame.width * frame.height, 0);
         let front_end = selection(self.profile).query;
         let view = frame.view()?;
         with_kernels!(self.processor, kernels => {
-            self.extractor.extract(kernels, view, front_end, &mut self.levels, &mut self.features)
+            let toned = TonedFrame::write(kernels, view, &mut self.toned)?;
+            self.extractor.extract(kernels, toned, front_end, &mut self.levels, &mut self.features)
         })
     }
 

@@ -6,7 +6,7 @@
 #![allow(unsafe_code, reason = "calling a function with a target feature, after asking the processor for it")]
 
 use daymark_core::feature::Signature;
-use daymark_core::kernel::{self, BoxSums, Kernels, Nearest, Patch, Seed, VoteColumns};
+use daymark_core::kernel::{self, BoxSums, Kernels, Nearest, Patch, Search, Seed, ShortColumns, VoteColumns};
 
 /// The kernels of one processor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -96,6 +96,8 @@ macro_rules! all_kernels {
             box_sums(patch: &Patch, sums: &mut BoxSums);
             distances(signature: Signature, others: &[Signature], out: &mut [u8]);
             count_below(values: &[u8], limit: u8) -> u32;
+            each_at_most(values: &[u8], limit: u8, found: &mut dyn FnMut(usize));
+            closest(entries: ShortColumns<'_>, search: Search) -> i32;
             nearest_three(row: &[u8], limit: u8) -> Nearest;
             votes(seed: Seed, columns: VoteColumns<'_>, agrees: &mut [u8]) -> i32;
         }

@@ -16,8 +16,8 @@ use crate::picture::GrayImage;
 
 /// The simulated views' noise begins here, so that it is not the noise with which corners were chosen.
 const FIRST_SEED: u64 = 1_000;
-/// A building that the picture fits with at most this probability of a chance is a look-alike.
-const LOOKALIKE_AT_MOST: f64 = 0.1;
+/// Views of the table for which good evidence is reckoned, so that it does not depend on who else is enrolled.
+const USUAL_VIEWS: u32 = 100;
 /// Look-alikes that are told, at most.
 const LOOKALIKES_TOLD: usize = 3;
 /// A corner's double has at most this many of 128 signature bits different.
@@ -32,11 +32,13 @@ const SHIFT_CELL: i32 = 8;
 pub struct ViewLint {
     /// Evidence that an answer needs in a table of this size, to be false with a probability of 1 % at most.
     pub needed_bits: f64,
+    /// Evidence that an answer needs in a table of 100 views.
+    pub usually_needed_bits: f64,
     /// Median evidence over simulated views of the picture.
     pub median_bits: f64,
     /// Evidence in the simulated view that fits worst.
     pub worst_bits: f64,
-    /// Other buildings that the picture fits, best first.
+    /// Other buildings that the picture fits so well that they would be the answer, best first.
     pub lookalikes: Vec<LookAlike>,
     /// Evidence of the mirrored picture.
     pub mirror_bits: f64,
@@ -99,8 +101,9 @@ pub fn lint(
     for other in (0..table.landmark_count()).filter(|&other| other != view.landmark()) {
         let landmark = table.landmark(other)?;
         let Some(found) = best_of(engine, table, landmark.views)? else { continue };
-        let false_answer = calibration.false_answer(found, views).probability();
-        if false_answer <= LOOKALIKE_AT_MOST {
+        let false_answer = calibration.false_answer(found, views);
+        if false_answer <= FalseAnswer::ONE_PERCENT {
+            let false_answer = false_answer.probability();
             lookalikes.push((found, LookAlike { name: landmark.name.to_owned(), bits: bits(found), false_answer }));
         }
     }
@@ -109,6 +112,7 @@ pub fn lint(
 
     Ok(ViewLint {
         needed_bits: bits(needed(calibration, views)),
+        usually_needed_bits: bits(needed(calibration, USUAL_VIEWS)),
         median_bits: bits((simulated[(CHANGES.len() - 1) / 2] + simulated[CHANGES.len() / 2]) / 2),
         worst_bits: bits(simulated[0]),
         lookalikes: lookalikes.into_iter().map(|(_, lookalike)| lookalike).collect(),

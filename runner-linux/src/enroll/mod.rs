@@ -7,6 +7,7 @@
 //! ```
 
 pub mod advice;
+mod cut_jpeg;
 pub mod lint;
 pub mod manifest;
 pub mod plan;
@@ -16,4 +17,5 @@ pub mod simulate;
 pub mod update;
 mod view;
 
+pub use cut_jpeg::is_cut_jpeg;
 pub use view::{TooFewCorners, view};

@@ -7,6 +7,7 @@ use daymark_core::kernel::Kernels;
 use daymark_core::math::{exp2, log2, log2_q8};
 use daymark_core::pyramid::{level_bytes, scale};
 use daymark_core::table::on_grid;
+use daymark_core::tone::TonedFrame;
 
 use super::simulate::CHANGES;
 use crate::picture::GrayImage;
@@ -73,22 +74,26 @@ pub fn select_corners<K: Kernels>(kernels: &K, image: &GrayImage, selection: Sel
 struct Reader<'a, K> {
     kernels: &'a K,
     extractor: Box<WideExtractor>,
+    toned: Vec<u8>,
     levels: Vec<u8>,
     features: Box<FeatureSet<MOST_CANDIDATES>>,
 }
 
 impl<'a, K: Kernels> Reader<'a, K> {
     fn new(kernels: &'a K) -> Self {
-        Self { kernels, extractor: Box::default(), levels: Vec::new(), features: Box::default() }
+        Self { kernels, extractor: Box::default(), toned: Vec::new(), levels: Vec::new(), features: Box::default() }
     }
 
     fn read(&mut self, image: &GrayImage, front_end: FrontEnd) -> Vec<Feature> {
         self.levels.resize(level_bytes(image.width, image.height), 0);
-        let Ok(view) = image.view() else { return Vec::new() };
-        match self.extractor.extract(self.kernels, view, front_end, &mut self.levels, &mut self.features) {
-            Ok(()) => self.features.view().iter().collect(),
-            Err(_) => Vec::new(),
-        }
+        self.toned.resize(image.width * image.height, 0);
+        let extracted = image
+            .view()
+            .and_then(|view| TonedFrame::write(self.kernels, view, &mut self.toned))
+            .and_then(|toned| {
+                self.extractor.extract(self.kernels, toned, front_end, &mut self.levels, &mut self.features)
+            });
+        if extracted.is_ok() { self.features.view().iter().collect() } else { Vec::new() }
     }
 }
 

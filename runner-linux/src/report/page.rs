@@ -20,7 +20,7 @@ table{border-collapse:collapse;font-variant-numeric:tabular-nums;font-size:.92re
 th,td{padding:.32rem .8rem;text-align:right;border-bottom:1px solid var(--line)}
 th{font-weight:600;color:var(--pale)}
 th:first-child,td:first-child{text-align:left;padding-left:0}
-.scroll{overflow-x:auto}
+.scroll{overflow-x:auto;margin:1rem 0}
 figure{margin:0}
 figcaption{font-size:.82rem;color:var(--pale);margin-top:.3rem;overflow-wrap:anywhere}
 .card{background:var(--card);border:1px solid var(--line);border-radius:10px;padding:1rem;margin:.9rem 0}

@@ -132,7 +132,7 @@ impl Plot {
         let [x, y] = self.point(mark.at);
         let [low, high] = mark.interval.map(|value| self.point([mark.at[0], value]));
         let colour = "var(--good, #0f8a55)";
-        let end = if x > WIDTH - 90.0 { ([x - 9.0, y - 7.0], "end") } else { ([x + 9.0, y - 7.0], "start") };
+        let end = if x > WIDTH - 90.0 { ([x - 9.0, y + 17.0], "end") } else { ([x + 9.0, y + 17.0], "start") };
         Group::new()
             .add(line(low, high).set("stroke", colour).set("stroke-width", 2).set("stroke-opacity", 0.55))
             .add(Circle::new().set("cx", format!("{x:.1}")).set("cy", format!("{y:.1}")).set("r", 4.5).set("fill", colour))

@@ -2,6 +2,7 @@
 
 use core::cell::UnsafeCell;
 use core::convert::Infallible;
+use core::mem::MaybeUninit;
 use core::ptr;
 use core::slice;
 
@@ -45,12 +46,12 @@ static LAYOUT: Layout = Layout {
     frame: [WIDTH, HEIGHT, WIDTH],
 };
 
-struct Place(UnsafeCell<Option<Result<Outcome, Failure>>>);
+struct Place(UnsafeCell<MaybeUninit<Result<Outcome, Failure>>>);
 
 // SAFETY: as for `Region`.
 unsafe impl Sync for Place {}
 
-static OUTCOME: Place = Place(UnsafeCell::new(None));
+static OUTCOME: Place = Place(UnsafeCell::new(MaybeUninit::uninit()));
 
 /// The only access to the regions.
 pub struct Device(());
@@ -108,7 +109,7 @@ impl Device {
     /// Shows the outcome to the outside.
     pub fn report(&mut self, outcome: Result<Outcome, Failure>) {
         // SAFETY: nobody else holds the place.
-        unsafe { ptr::write_volatile(OUTCOME.0.get(), Some(outcome)) };
+        unsafe { ptr::write_volatile(OUTCOME.0.get(), MaybeUninit::new(outcome)) };
     }
 }
 

@@ -16,10 +16,8 @@ const CORNERS: usize = corners_limit(Profile::Handheld) as usize;
 /// The table goes to the beginning of the flash pages.
 #[inline(never)]
 pub fn enroll(features: Features<'_>, flash: Flash) -> Result<(), Failure> {
-    let mut corners = [(0, Feature::default()); CORNERS];
-    let count = chosen(features, &mut corners);
-    let sorted = corners.map(|(_, corner)| corner);
-    let sorted = sorted.get(..count).unwrap_or(&[]);
+    let mut corners = [Feature::default(); CORNERS];
+    let sorted = chosen(features, &mut corners);
 
     let limit = corners_limit(Profile::Handheld);
     let mut encoder = TableEncoder::new(Profile::Handheld, limit, 1, 1)?;
@@ -36,24 +34,24 @@ pub fn enroll(features: Features<'_>, flash: Flash) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Every third feature, sorted as a view wants it, each place once; how many.
-fn chosen(features: Features<'_>, corners: &mut [(u32, Feature); CORNERS]) -> usize {
+/// Every third feature, sorted as a view wants it, each place once.
+fn chosen<'c>(features: Features<'_>, corners: &'c mut [Feature; CORNERS]) -> &'c [Feature] {
     let mut count = 0;
     for feature in features.iter().step_by(3) {
         let corner = Feature { position: on_grid(feature.position, features.width, features.height), ..feature };
         let Ok(key) = corner_key(&corner) else { continue };
-        let taken = corners.get(..count).unwrap_or(&[]).iter().any(|&(other, _)| other == key);
+        let taken = corners.get(..count).unwrap_or(&[]).iter().any(|other| corner_key(other) == Ok(key));
         let Some(slot) = corners.get_mut(count).filter(|_| !taken) else { continue };
-        *slot = (key, corner);
+        *slot = corner;
         count += 1;
         let mut at = count - 1;
         while at > 0
             && let Some([before, after]) = corners.get_mut(at - 1..=at)
-            && before.0 > after.0
+            && corner_key(before) > corner_key(after)
         {
             core::mem::swap(before, after);
             at -= 1;
         }
     }
-    count
+    corners.get(..count).unwrap_or(&[])
 }

@@ -48,7 +48,7 @@ fn run(device: &Device) -> Result<Outcome, Failure> {
 #[inline(never)]
 fn see(device: &Device, features: &mut HandheldFeatures) -> Result<(), Failure> {
     let mut levels = [0; MEMORY.levels];
-    let mut extractor = HandheldExtractor::new();
+    let mut extractor = const { HandheldExtractor::new() };
     let (pixels, [width, height, stride]) = device.frame();
     let frame = GrayView::new(pixels, width, height, stride)?;
     extractor.count_corners(&Portable, frame, HANDHELD_FRONT_END, &mut levels)?;

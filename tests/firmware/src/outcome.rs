@@ -6,6 +6,7 @@ use daymark_core::verdict::Recognition;
 
 /// The answers of both readers, which must be the same.
 #[derive(Clone, Copy)]
+#[cfg_attr(target_os = "none", expect(dead_code, reason = "the fields are for whoever looks at the memory"))]
 pub struct Outcome {
     /// From the table in place.
     pub in_place: Recognition,
@@ -19,6 +20,7 @@ pub struct Outcome {
 
 /// Why there is no outcome.
 #[derive(Clone, Copy)]
+#[expect(dead_code, reason = "the fields are for whoever looks at the memory")]
 pub enum Failure {
     /// The frame.
     Frame(FrameError),

@@ -26,7 +26,7 @@ pub fn recognize(features: Features<'_>, device: &Device) -> Result<Outcome, Fai
 #[inline(never)]
 fn from_place(features: Features<'_>, flash: Flash, length: usize) -> Result<(Recognition, usize), Failure> {
     let mut distances = [0; MEMORY.distances];
-    let mut recognizer = HandheldRecognizer::new();
+    let mut recognizer = const { HandheldRecognizer::new() };
     // SAFETY: nothing is written to the table in this function.
     let mut table = LandmarkTable::open(unsafe { flash.in_place(length) })?.verified()?;
     let limit = FalseAnswer::ONE_PERCENT;
@@ -43,7 +43,7 @@ fn from_place(features: Features<'_>, flash: Flash, length: usize) -> Result<(Re
 fn from_stream(features: Features<'_>, flash: Flash, length: usize) -> Result<(Recognition, usize), Failure> {
     let mut distances = [0; MEMORY.distances];
     let mut record = [0; MEMORY.record];
-    let mut recognizer = HandheldRecognizer::new();
+    let mut recognizer = const { HandheldRecognizer::new() };
     let mut table = TableStream::open(flash.stream(length))?;
     table.verify(&mut record)?;
     let limit = FalseAnswer::ONE_PERCENT;

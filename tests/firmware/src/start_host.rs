@@ -1,6 +1,7 @@
 //! The start on a host: the C library calls `main`. It measures the stack and says how the round went.
 
 use core::ffi::{c_char, c_int};
+use core::hint::black_box;
 use core::ptr;
 
 use daymark_core::verdict::Verdict;
@@ -48,26 +49,26 @@ extern "C" fn main(_: c_int, _: *const *const c_char) -> c_int {
     c_int::from(!(known && same && outcome.explained > 0 && outcome.name_bytes > 0 && stack <= 64 * 1_024))
 }
 
-/// Paints the stack below this call, and returns the lowest painted byte.
+/// Paints the stack below this call, and returns the address of its lowest painted byte.
 #[inline(never)]
-fn paint() -> *mut u8 {
-    let mut here = 0_u8;
-    let top = &raw mut here;
+fn paint() -> usize {
+    let here = 0_u8;
+    let top = black_box((&raw const here).expose_provenance());
     // From above down, so that the system extends the stack as it goes; 256 bytes are left to this very call.
-    for depth in 256..WATCHED {
+    for address in (top - WATCHED..top - 256).rev() {
         // SAFETY: below the stack pointer, in the thread's own stack of megabytes, where nothing lives.
-        unsafe { ptr::write_volatile(top.wrapping_sub(depth), PAINT) };
+        unsafe { ptr::write_volatile(ptr::with_exposed_provenance_mut(address), PAINT) };
     }
-    top.wrapping_sub(WATCHED - 1)
+    top - WATCHED
 }
 
 /// Bytes from the deepest that was touched up to the caller.
 #[inline(never)]
-fn used(bottom: *mut u8) -> usize {
-    let mut at = 0;
+fn used(bottom: usize) -> usize {
+    let mut untouched = 0;
     // SAFETY: painted bytes.
-    while at < WATCHED - 256 && unsafe { ptr::read_volatile(bottom.wrapping_add(at)) } == PAINT {
-        at += 1;
+    while untouched < WATCHED && unsafe { ptr::read_volatile(ptr::with_exposed_provenance::<u8>(bottom + untouched)) } == PAINT {
+        untouched += 1;
     }
-    WATCHED - 1 - at
+    WATCHED - untouched
 }

@@ -92,7 +92,6 @@ pub(super) fn print(
     changes: &[Change],
     lints: &[Vec<Option<ViewLint>>],
 ) -> Result<(), CommandError> {
-    let most_corners = table.profile().corners_per_view();
     let lint_of = |change: usize, picture: usize| lints.get(change)?.get(picture)?.as_ref();
     let mut found = Vec::new();
     let mut text = String::new();
@@ -103,7 +102,7 @@ pub(super) fn print(
         for (j, picture) in change.pictures.iter().enumerate() {
             let (file, lint) = (picture.path.to_string_lossy().into_owned(), lint_of(i, j));
             text += &line(picture, lint);
-            found.extend(lint.into_iter().flat_map(|lint| warnings(&change.name, &file, lint, most_corners)));
+            found.extend(lint.into_iter().flat_map(|lint| warnings(&change.name, &file, lint, table.profile())));
             let measures = lint.map(Measures::from);
             images.push(EnrolledImage { file, known: picture.known, corners: picture.corners, measures });
         }

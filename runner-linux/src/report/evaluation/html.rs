@@ -49,7 +49,13 @@ fn write_page(out: &mut String, evaluation: &Evaluation, read: Read<'_>) -> std:
         out.push_str(&tile(&milliseconds(times.one_view_p50_ms), "a stored view (median)"));
     }
     out.push_str("</div>\n");
-    writeln!(out, "<h2>Does the stated probability hold?</h2>\n<div class=\"row\">")?;
+    writeln!(
+        out,
+        "<h2>Does the stated probability hold?</h2>\n<p class=\"pale\">Red: the share of negatives whose best building \
+         states this probability or a smaller one. Dashed: where that should be. Green points: negatives that were \
+         answered, with 95 % intervals; a frame that two buildings fit about equally well is not answered.</p>\n\
+         <div class=\"row\">"
+    )?;
     writeln!(out, "{}\n{}\n</div>", reliability_plot(evaluation).to_svg(), recall_plot(evaluation).to_svg())?;
     out.push_str(&stated_table(evaluation));
     writeln!(out, "<h2>By source</h2>")?;
