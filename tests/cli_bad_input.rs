@@ -51,7 +51,7 @@ fn encoded(picture: &DynamicImage, format: ImageFormat) -> Vec<u8> {
 }
 
 /// A chunk of a PNG file.
-fn chunk(kind: &[u8; 4], data: &[u8]) -> Vec<u8> {
+fn chunk(kind: [u8; 4], data: &[u8]) -> Vec<u8> {
     let length = u32::try_from(data.len()).expect("short");
     let checked = [kind.as_slice(), data].concat();
     let crc = checked.iter().fold(!0_u32, |crc, &byte| {
@@ -93,7 +93,8 @@ fn a_picture_that_claims_to_be_huge_is_refused_before_memory_is_taken() {
     let side = 30_000_u32.to_be_bytes();
     // Gray of 8 bits; the pixels are missing, and nobody must look for them.
     let header = [side.as_slice(), &side, &[8, 0, 0, 0, 0]].concat();
-    let png = [b"\x89PNG\r\n\x1a\n".as_slice(), &chunk(b"IHDR", &header), &chunk(b"IDAT", &[]), &chunk(b"IEND", &[])];
+    let png =
+        [b"\x89PNG\r\n\x1a\n".as_slice(), &chunk(*b"IHDR", &header), &chunk(*b"IDAT", &[]), &chunk(*b"IEND", &[])];
     town.write("huge.png", png.concat());
     refused_picture(&town, "huge.png", &["30000 x 30000 pixels", "scale it down"]);
     // 256 MB of address space are not enough for 900 million pixels.
@@ -214,7 +215,7 @@ fn a_table_of_a_newer_version_is_refused_by_name() {
     let mut newer = town.read("town.daymark");
     newer[8] = 9;
     // The header's own checksum stands in its last four bytes; it is that of zlib, as in a PNG chunk.
-    let crc = chunk(&newer[..4].try_into().expect("4 bytes"), &newer[4..36]);
+    let crc = chunk(newer[..4].try_into().expect("4 bytes"), &newer[4..36]);
     let crc: [u8; 4] = crc[crc.len() - 4..].try_into().expect("4 bytes");
     newer[36..40].copy_from_slice(&u32::from_be_bytes(crc).to_le_bytes());
     town.write("newer.daymark", &newer);

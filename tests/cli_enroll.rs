@@ -153,9 +153,7 @@ fn a_table_holds_one_profile() {
 
 /// A JPEG of a tower with GPS data: 48°30'36" N, 2°18' W.
 fn with_gps() -> Vec<u8> {
-    let rationals = |values: [u32; 3]| {
-        ExifValue::Rational(values.map(|num| Rational { num, denom: 1 }).to_vec())
-    };
+    let rationals = |values: [u32; 3]| ExifValue::Rational(values.map(|num| Rational { num, denom: 1 }).to_vec());
     let letter = |letter: &str| ExifValue::Ascii(vec![letter.into()]);
     let field = |tag, value| Field { tag, ifd_num: In::PRIMARY, value };
     let fields = [
@@ -165,7 +163,9 @@ fn with_gps() -> Vec<u8> {
         field(Tag::GPSLongitudeRef, letter("W")),
     ];
     let mut writer = Writer::new();
-    fields.iter().for_each(|field| writer.push_field(field));
+    for field in &fields {
+        writer.push_field(field);
+    }
     let mut tiff = Cursor::new(Vec::new());
     writer.write(&mut tiff, false).expect("written");
     let segment = [b"Exif\0\0".as_slice(), &tiff.into_inner()].concat();
@@ -225,7 +225,8 @@ fn a_look_alike_and_a_picture_that_adds_nothing_are_told() {
     // Nothing is measured of what was there already, and nothing where nobody wants it.
     let again = [ENROLL.as_slice(), &["--name", "Door", "--json", "again.png"]].concat();
     town.run(&[again.as_slice(), &["--no-lint"]].concat()).succeeded();
-    for document in [town.run(&again).succeeded().json(), town.run(&[again.as_slice(), &["--no-lint"]].concat()).json()] {
+    for document in [town.run(&again).succeeded().json(), town.run(&[again.as_slice(), &["--no-lint"]].concat()).json()]
+    {
         assert_eq!(document["enrolled"][0]["images"][0]["measures"], Value::Null);
         assert_eq!(document["enrolled"][0]["images"][0]["known"], true);
     }
@@ -264,7 +265,8 @@ fn a_table_is_listed_shown_and_verified() {
     let document = town.run(&["table", "list", "town.daymark", "--json"]).succeeded().json();
     assert_eq!(keys(&document), ["landmarks", "schema_version", "table"]);
     assert_eq!(keys(&document["landmarks"][0]), ["bytes", "kind", "landmark", "position", "views"]);
-    let bytes: u64 = document["landmarks"].as_array().expect("all").iter().filter_map(|one| one["bytes"].as_u64()).sum();
+    let bytes: u64 =
+        document["landmarks"].as_array().expect("all").iter().filter_map(|one| one["bytes"].as_u64()).sum();
     assert_eq!(bytes + 40, town.read("town.daymark").len() as u64, "a header, and nothing that is nobody's");
     assert_eq!(document["table"]["bytes"], bytes + 40);
 

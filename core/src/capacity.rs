@@ -26,7 +26,7 @@ pub const HANDHELD_FRONT_END: FrontEnd = FrontEnd { features: HANDHELD_FEATURES 
 /// Width of the strip of responses: 52 columns of corners at a time, with 12 that neighbours compute again.
 ///
 /// 104 bytes a column. With 32 the front end of a 320 x 240 frame computes 60 % more, with 128 10 % less.
-const STRIP: usize = 64;
+const STRIP: usize = 48;
 
 /// Corners of a stored view, at most.
 const STORED: usize = corners_limit(Profile::Handheld) as usize;

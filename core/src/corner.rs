@@ -6,7 +6,7 @@
 //! threshold: dark frames work.
 
 use crate::image::GrayView;
-use crate::kernel::Kernels;
+use crate::kernel::{Kernels, marked};
 use crate::point::SUBPIXEL;
 use crate::response::{REACH, RESPONSE_ROWS, ResponseRows};
 
@@ -151,31 +151,15 @@ impl<const STRIP: usize, const SLOTS: usize> Default for CornerDetector<STRIP, S
     }
 }
 
-/// The indices of the non-zero flags, eight at a look.
-fn marked(flags: &[u8]) -> impl Iterator<Item = usize> {
-    let (chunks, rest) = flags.as_chunks::<8>();
-    let tail = chunks.len() * 8;
-    let in_chunks = chunks.iter().enumerate().flat_map(|(number, chunk)| {
-        let mut bits = u64::from_le_bytes(*chunk);
-        core::iter::from_fn(move || {
-            if bits == 0 {
-                return None;
-            }
-            let place = bits.trailing_zeros() as usize;
-            bits &= bits - 1;
-            Some(number * 8 + place / 8)
-        })
-    });
-    in_chunks.chain(rest.iter().enumerate().filter(|(_, flag)| **flag != 0).map(move |(i, _)| tail + i))
-}
-
 /// Whether no response within 3 px is larger; equal ones count if they come earlier in raster order.
 fn is_peak(near: &[&[f32]; RESPONSE_ROWS], at: usize, response: f32) -> bool {
     near.iter().enumerate().all(|(y, row)| {
         let Some(window) = row.get(at - PEAK_REACH..=at + PEAK_REACH) else { return false };
         match y {
             0..PEAK_REACH => window.iter().all(|&r| r < response),
-            PEAK_REACH => window.iter().enumerate().all(|(x, &r)| if x < PEAK_REACH { r < response } else { r <= response }),
+            PEAK_REACH => {
+                window.iter().enumerate().all(|(x, &r)| if x < PEAK_REACH { r < response } else { r <= response })
+            }
             _ => window.iter().all(|&r| r <= response),
         }
     })
@@ -254,11 +238,9 @@ impl<const SLOTS: usize> Spread<SLOTS> {
 
     fn push(&mut self, cell: usize, peak: Peak) {
         let kept = self.per_cell;
-        let (Some(slots), Some(count), Some(floor)) = (
-            self.slots.get_mut(cell * kept..(cell + 1) * kept),
-            self.counts.get_mut(cell),
-            self.floors.get_mut(cell),
-        ) else {
+        let (Some(slots), Some(count), Some(floor)) =
+            (self.slots.get_mut(cell * kept..(cell + 1) * kept), self.counts.get_mut(cell), self.floors.get_mut(cell))
+        else {
             return;
         };
         if let Some(slot) = slots.get_mut(*count) {
@@ -272,9 +254,12 @@ impl<const SLOTS: usize> Spread<SLOTS> {
         } else if let Some(slot) = slots.get_mut(floor.1) {
             *slot = peak;
         }
-        *floor = slots.iter().enumerate().fold((Peak(u64::MAX), 0), |weakest, (i, &peak)| {
-            if peak < weakest.0 { (peak, i) } else { weakest }
-        });
+        *floor = slots.iter().enumerate().fold(
+            (Peak(u64::MAX), 0),
+            |weakest, (i, &peak)| {
+                if peak < weakest.0 { (peak, i) } else { weakest }
+            },
+        );
     }
 
     fn select(&mut self, count: usize, share: usize, mut emit: impl FnMut(LevelCorner)) {

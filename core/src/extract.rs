@@ -192,7 +192,12 @@ impl<const STRIP: usize, const SLOTS: usize> Extractor<STRIP, SLOTS> {
                 let (x, y) = corner.subpixel();
                 let signature = describe(kernels, level, corner.column, corner.row, scratch);
                 // Settings that ask for more than `FEATURES` lose the coarsest levels' last cells.
-                let _ = features.push(Feature { position: base_from_level(number, x, y), level: number, commonness: 0, signature });
+                let _ = features.push(Feature {
+                    position: base_from_level(number, x, y),
+                    level: number,
+                    commonness: 0,
+                    signature,
+                });
             });
         })
     }

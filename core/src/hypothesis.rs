@@ -9,7 +9,7 @@ use crate::transform::Affine;
 /// Hypotheses that are verified for a stored view, at most.
 pub const MOST_HYPOTHESES: usize = 8;
 /// A hypothesis with less support than this, in bits, is not worth verifying.
-const LEAST_SUPPORT_BITS: i32 = 6;
+const LEAST_SUPPORT_BITS: i32 = 16;
 /// Hypotheses that take the view's centre to places closer than this (L1, px) at the same scale are one.
 const SAME_PLACE: f32 = 24.0;
 

@@ -65,8 +65,8 @@ pub trait Kernels {
         each_at_most(values, limit, found);
     }
     /// See [`closest`].
-    fn closest(&self, entries: ShortColumns<'_>, search: Search) -> i32 {
-        closest(entries, search)
+    fn closest(&self, blocks: &[LookAlikes], search: Search) -> i32 {
+        closest(blocks, search)
     }
     /// See [`nearest_three`].
     fn nearest_three(&self, row: &[u8], limit: u8) -> Nearest {
@@ -158,9 +158,7 @@ pub fn structure_row(rows: [&[u8]; 3], products: [&mut [i32]; 3], out: [&mut [i3
     let [above, centre, below] = rows;
     let [xx, yy, xy] = products;
     let windows = above.windows(3).zip(centre.windows(3)).zip(below.windows(3));
-    for ((((above, centre), below), (xx, yy)), xy) in
-        windows.zip(xx.iter_mut().zip(yy.iter_mut())).zip(xy.iter_mut())
-    {
+    for ((((above, centre), below), (xx, yy)), xy) in windows.zip(xx.iter_mut().zip(yy.iter_mut())).zip(xy.iter_mut()) {
         let (&[a0, a1, a2], &[c0, _, c2], &[b0, b1, b2]) = (above, centre, below) else { return };
         let [a0, a1, a2, c0, c2, b0, b1, b2] = [a0, a1, a2, c0, c2, b0, b1, b2].map(i16::from);
         let gx = i32::from(2 * (c2 - c0) + (a2 - a0) + (b2 - b0));
@@ -291,60 +289,101 @@ pub struct Nearest {
 pub fn nearest_three(row: &[u8], limit: u8) -> Nearest {
     let mut nearest = Nearest { distances: [255; 3], places: [0; 3] };
     let mut bound = limit;
-    for (number, chunk) in row.chunks(32).enumerate() {
-        // Most chunks hold nothing near: one look at their minimum passes them by.
-        if chunk.iter().fold(255, |least, &d| if d < least { d } else { least }) > bound {
-            continue;
-        }
-        for (offset, &distance) in chunk.iter().enumerate() {
-            if distance > bound {
-                continue;
+    for (number, chunk) in row.chunks(64).enumerate() {
+        for (group, mut marks) in at_most(chunk, bound).into_iter().enumerate() {
+            while marks != 0 {
+                let offset = group * 8 + marks.trailing_zeros() as usize / 8;
+                marks &= marks - 1;
+                let Some(&distance) = chunk.get(offset) else { break };
+                if distance > bound {
+                    continue;
+                }
+                let place = (number * 64 + offset) as u16;
+                let [d0, d1, d2] = nearest.distances;
+                let [p0, p1, _] = nearest.places;
+                if distance < d0 {
+                    nearest = Nearest { distances: [distance, d0, d1], places: [place, p0, p1] };
+                } else if distance < d1 {
+                    nearest = Nearest { distances: [d0, distance, d1], places: [p0, place, p1] };
+                } else if distance < d2 {
+                    nearest = Nearest { distances: [d0, d1, distance], places: [p0, p1, place] };
+                }
+                // Equal to the third does not enter.
+                bound = bound.min(nearest.distances[2].saturating_sub(1));
             }
-            let place = (number * 32 + offset) as u16;
-            let [d0, d1, d2] = nearest.distances;
-            let [p0, p1, _] = nearest.places;
-            if distance < d0 {
-                nearest = Nearest { distances: [distance, d0, d1], places: [place, p0, p1] };
-            } else if distance < d1 {
-                nearest = Nearest { distances: [d0, distance, d1], places: [p0, place, p1] };
-            } else if distance < d2 {
-                nearest = Nearest { distances: [d0, d1, distance], places: [p0, p1, place] };
-            }
-            // Equal to the third does not enter.
-            bound = bound.min(nearest.distances[2].saturating_sub(1));
         }
     }
     nearest
+}
+
+/// Marks the values of at most `limit` among the first 64: byte `b` of word `w` is 1 for value `8 w + b`.
+#[inline(always)]
+fn at_most(values: &[u8], limit: u8) -> [u64; 8] {
+    let mut marks = [0; 64];
+    if let Some(values) = values.first_chunk::<64>() {
+        for (mark, &value) in marks.iter_mut().zip(values) {
+            *mark = u8::from(value <= limit);
+        }
+    } else {
+        for (mark, &value) in marks.iter_mut().zip(values) {
+            *mark = u8::from(value <= limit);
+        }
+    }
+    let mut words = [0; 8];
+    for (word, marks) in words.iter_mut().zip(marks.as_chunks::<8>().0) {
+        *word = u64::from_le_bytes(*marks);
+    }
+    words
+}
+
+/// The places of the bytes that are not 0, eight at a look.
+#[inline(always)]
+pub fn marked(marks: &[u8]) -> impl Iterator<Item = usize> {
+    let (chunks, rest) = marks.as_chunks::<8>();
+    let tail = chunks.len() * 8;
+    let in_chunks = chunks.iter().enumerate().flat_map(|(number, chunk)| {
+        let mut bits = u64::from_le_bytes(*chunk);
+        core::iter::from_fn(move || {
+            if bits == 0 {
+                return None;
+            }
+            let place = bits.trailing_zeros() as usize;
+            bits &= bits - 1;
+            Some(number * 8 + place / 8)
+        })
+    });
+    in_chunks.chain(rest.iter().enumerate().filter(|(_, mark)| **mark != 0).map(move |(i, _)| tail + i))
 }
 
 /// Calls `found` with the place of every value of at most `limit`, in order.
 #[inline(always)]
 pub fn each_at_most(values: &[u8], limit: u8, found: &mut dyn FnMut(usize)) {
     for (number, chunk) in values.chunks(64).enumerate() {
-        let mut marks = 0_u64;
-        for (bit, &value) in chunk.iter().enumerate() {
-            marks |= u64::from(value <= limit) << bit;
-        }
-        while marks != 0 {
-            found(number * 64 + marks.trailing_zeros() as usize);
-            marks &= marks - 1;
+        for (group, mut marks) in at_most(chunk, limit).into_iter().enumerate() {
+            while marks != 0 {
+                found(number * 64 + group * 8 + marks.trailing_zeros() as usize / 8);
+                marks &= marks - 1;
+            }
         }
     }
 }
 
-/// Corners of the frame that look like one stored corner, as columns of equal length.
+/// Corners of the frame that look like one stored corner, side by side.
+pub const LANES: usize = 16;
+
+/// A block of corners of the frame that look like one stored corner; what fills it up has no gain.
 #[derive(Debug, Clone, Copy)]
-pub struct ShortColumns<'a> {
+pub struct LookAlikes {
     /// x in the frame, px.
-    pub x: &'a [f32],
+    pub x: [f32; LANES],
     /// y in the frame, px.
-    pub y: &'a [f32],
+    pub y: [f32; LANES],
     /// Gain in 1/64 bit.
-    pub gain: &'a [i32],
+    pub gain: [i32; LANES],
     /// The corner's level, as the bit of that number.
-    pub level: &'a [i32],
+    pub level: [i32; LANES],
     /// The corner's number.
-    pub number: &'a [i32],
+    pub number: [i32; LANES],
 }
 
 /// A place to search around, in the frame.
@@ -379,16 +418,19 @@ pub const NUMBER_BITS: u32 = 11;
 /// Corners of a frame have numbers up to this.
 pub const NUMBER_LIMIT: i32 = (1 << NUMBER_BITS) - 1;
 
-/// The largest [`search_key`] of the entries.
+/// The largest [`search_key`] of the corners.
 #[inline(always)]
-pub fn closest(entries: ShortColumns<'_>, search: Search) -> i32 {
-    let ShortColumns { x, y, gain, level, number } = entries;
-    let places = x.iter().zip(y).zip(gain.iter().zip(level)).zip(number);
-    places.fold(0, |best, (((&x, &y), (&gain, &level)), &number)| {
-        let [dx, dy] = [x - search.at[0], y - search.at[1]];
-        let key = search_key(search, dx * dx + dy * dy, gain, level, number);
-        if key > best { key } else { best }
-    })
+pub fn closest(blocks: &[LookAlikes], search: Search) -> i32 {
+    let mut best = [0; LANES];
+    for block in blocks {
+        for lane in 0..LANES {
+            let [dx, dy] = [block.x[lane] - search.at[0], block.y[lane] - search.at[1]];
+            let (gain, level, number) = (block.gain[lane], block.level[lane], block.number[lane]);
+            let key = search_key(search, dx * dx + dy * dy, gain, level, number);
+            best[lane] = if key > best[lane] { key } else { best[lane] };
+        }
+    }
+    best.into_iter().fold(0, |best, key| if key > best { key } else { best })
 }
 
 /// Candidate correspondences as columns of equal length.
@@ -436,14 +478,9 @@ pub const SLACK_PER_PIXEL: f32 = 0.22;
 pub fn votes(seed: Seed, columns: VoteColumns<'_>, agrees: &mut [u8]) -> i32 {
     let VoteColumns { from_x, from_y, to_x, to_y, step, gain } = columns;
     let n = from_x.len();
-    let (Some(from_y), Some(to_x), Some(to_y), Some(step), Some(gain), Some(agrees)) = (
-        from_y.get(..n),
-        to_x.get(..n),
-        to_y.get(..n),
-        step.get(..n),
-        gain.get(..n),
-        agrees.get_mut(..n),
-    ) else {
+    let (Some(from_y), Some(to_x), Some(to_y), Some(step), Some(gain), Some(agrees)) =
+        (from_y.get(..n), to_x.get(..n), to_y.get(..n), step.get(..n), gain.get(..n), agrees.get_mut(..n))
+    else {
         return 0;
     };
     let mut sum = 0;

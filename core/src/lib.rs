@@ -6,28 +6,29 @@ pub mod math;
 pub mod point;
 pub mod profile;
 
+pub mod corner;
+pub mod extract;
 pub mod feature;
 pub mod image;
 pub mod kernel;
 mod model;
-pub mod tone;
 pub mod pyramid;
 pub mod response;
-pub mod corner;
 pub mod signature;
-pub mod extract;
+pub mod tone;
 
-pub mod query;
 pub mod candidate;
-pub mod hypothesis;
-pub mod transform;
-pub mod shortlist;
-pub mod refine;
 pub mod evidence;
+pub mod hypothesis;
 pub mod matcher;
+pub mod query;
+pub mod refine;
+pub mod shortlist;
+pub mod linear;
+pub mod transform;
 
 pub mod table;
 
-pub mod verdict;
-pub mod recognizer;
 pub mod capacity;
+pub mod recognizer;
+pub mod verdict;

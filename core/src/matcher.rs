@@ -8,8 +8,8 @@ use crate::extract::Features;
 use crate::hypothesis::{Hypotheses, HypothesisSource, SignatureVotes};
 use crate::kernel::Kernels;
 use crate::query::QueryIndex;
-use crate::shortlist::Shortlist;
 use crate::refine::{Pairing, Refined, refine};
+use crate::shortlist::Shortlist;
 use crate::transform::{Homography, Shape, WeightedPair};
 
 /// Fewer candidates than this propose nothing.
@@ -32,11 +32,11 @@ pub struct ViewMatch {
     pub supporting_corners: u16,
 }
 
-/// Working memory for views of at most `STORED` corners; `ENTRIES` places for look-alikes make it faster and change
+/// Working memory for views of at most `STORED` corners; `BLOCKS` of look-alikes make it faster and change
 /// nothing else.
 #[derive(Debug, Clone)]
-pub struct Matcher<const STORED: usize, const CANDIDATES: usize, const ENTRIES: usize> {
-    shortlist: Shortlist<ENTRIES>,
+pub struct Matcher<const STORED: usize, const CANDIDATES: usize, const BLOCKS: usize> {
+    shortlist: Shortlist<STORED, BLOCKS>,
     candidates: Candidates<CANDIDATES>,
     votes: SignatureVotes<CANDIDATES>,
     pairs: Vec<WeightedPair, CANDIDATES>,
@@ -44,7 +44,7 @@ pub struct Matcher<const STORED: usize, const CANDIDATES: usize, const ENTRIES: 
     best_corners: Vec<CornerEvidence, STORED>,
 }
 
-impl<const STORED: usize, const CANDIDATES: usize, const ENTRIES: usize> Matcher<STORED, CANDIDATES, ENTRIES> {
+impl<const STORED: usize, const CANDIDATES: usize, const BLOCKS: usize> Matcher<STORED, CANDIDATES, BLOCKS> {
     /// Working memory; nothing depends on what was matched before.
     pub const fn new() -> Self {
         const { assert!(CANDIDATES >= STORED, "every stored corner may become a pair") };
@@ -108,8 +108,8 @@ impl<const STORED: usize, const CANDIDATES: usize, const ENTRIES: usize> Matcher
     }
 }
 
-impl<const STORED: usize, const CANDIDATES: usize, const ENTRIES: usize> Default
-    for Matcher<STORED, CANDIDATES, ENTRIES>
+impl<const STORED: usize, const CANDIDATES: usize, const BLOCKS: usize> Default
+    for Matcher<STORED, CANDIDATES, BLOCKS>
 {
     fn default() -> Self {
         Self::new()

@@ -8,6 +8,12 @@ pub fn sqrt(x: f32) -> f32 {
     if x > 0.0 { libm::sqrtf(x) } else { 0.0 }
 }
 
+/// [`sqrt`] in `f64`.
+#[inline]
+pub fn sqrt_f64(x: f64) -> f64 {
+    if x > 0.0 { libm::sqrt(x) } else { 0.0 }
+}
+
 /// `2^x`, within 1 ulp.
 #[inline]
 pub fn exp2(x: f64) -> f64 {

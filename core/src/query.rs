@@ -34,10 +34,8 @@ impl<const FEATURES: usize> QueryIndex<FEATURES> {
 
     /// Arranges these features; those beyond `FEATURES` are left out. Within a cell they keep their order.
     pub fn arrange(&mut self, features: Features<'_>) {
-        self.per_pixel = [
-            GRID[0] as f32 / f32::from(features.width.max(1)),
-            GRID[1] as f32 / f32::from(features.height.max(1)),
-        ];
+        self.per_pixel =
+            [GRID[0] as f32 / f32::from(features.width.max(1)), GRID[1] as f32 / f32::from(features.height.max(1))];
         self.starts = [0; CELLS + 1];
         let positions = || features.positions.iter().take(FEATURES).map(|position| position.to_pixels());
         // Counting sort: first the sizes, one cell ahead; then their sums; then each feature at its cell's next place.

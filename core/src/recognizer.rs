@@ -12,13 +12,15 @@ use crate::verdict::{Calibration, FalseAnswer, LEAST_CORNERS, Ranking, Recogniti
 ///
 /// The distances of one view to the frame need `STORED * QUERY` bytes more, which the caller lends.
 #[derive(Debug, Clone)]
-pub struct Recognizer<const STORED: usize, const CANDIDATES: usize, const ENTRIES: usize, const QUERY: usize> {
-    matcher: Matcher<STORED, CANDIDATES, ENTRIES>,
+pub struct Recognizer<const STORED: usize, const CANDIDATES: usize, const BLOCKS: usize, const QUERY: usize> {
+    matcher: Matcher<STORED, CANDIDATES, BLOCKS>,
     index: QueryIndex<QUERY>,
     stored: FeatureSet<STORED>,
 }
 
-impl<const STORED: usize, const CANDIDATES: usize, const ENTRIES: usize, const QUERY: usize> Recognizer<STORED, CANDIDATES, ENTRIES, QUERY> {
+impl<const STORED: usize, const CANDIDATES: usize, const BLOCKS: usize, const QUERY: usize>
+    Recognizer<STORED, CANDIDATES, BLOCKS, QUERY>
+{
     /// Bytes of distances of the largest view to the largest frame.
     pub const DISTANCE_BYTES: usize = STORED * QUERY;
 
@@ -87,8 +89,8 @@ impl<const STORED: usize, const CANDIDATES: usize, const ENTRIES: usize, const Q
     }
 }
 
-impl<const STORED: usize, const CANDIDATES: usize, const ENTRIES: usize, const QUERY: usize> Default
-    for Recognizer<STORED, CANDIDATES, ENTRIES, QUERY>
+impl<const STORED: usize, const CANDIDATES: usize, const BLOCKS: usize, const QUERY: usize> Default
+    for Recognizer<STORED, CANDIDATES, BLOCKS, QUERY>
 {
     fn default() -> Self {
         Self::new()

@@ -77,10 +77,10 @@ pub struct Refined {
 /// Refines a hypothesis; `None` if it loses its pairs or becomes a map that no camera sees.
 ///
 /// `pairs` is working memory. Cost: four rounds of one lookup for each stored corner.
-pub fn refine<K: Kernels, const QUERY: usize, const ENTRIES: usize, const PAIRS: usize>(
+pub fn refine<K: Kernels, const QUERY: usize, const STORED: usize, const BLOCKS: usize, const PAIRS: usize>(
     kernels: &K,
     pairing: &Pairing<'_, QUERY>,
-    shortlist: &Shortlist<ENTRIES>,
+    shortlist: &Shortlist<STORED, BLOCKS>,
     candidates: CandidateView<'_>,
     hypothesis: &Hypothesis,
     pairs: &mut Vec<WeightedPair, PAIRS>,
@@ -143,10 +143,10 @@ fn squared_distance(a: [f32; 2], b: [f32; 2]) -> f32 {
 }
 
 /// For every stored corner the query corner within the radius that gains most for its closeness.
-fn guided_pairs<K: Kernels, const QUERY: usize, const ENTRIES: usize, const PAIRS: usize>(
+fn guided_pairs<K: Kernels, const QUERY: usize, const STORED: usize, const BLOCKS: usize, const PAIRS: usize>(
     kernels: &K,
     pairing: &Pairing<'_, QUERY>,
-    shortlist: &Shortlist<ENTRIES>,
+    shortlist: &Shortlist<STORED, BLOCKS>,
     map: &Homography,
     map_scale: f32,
     radius: f32,
@@ -160,7 +160,7 @@ fn guided_pairs<K: Kernels, const QUERY: usize, const ENTRIES: usize, const PAIR
         let levels = i32::from(fitting.get(usize::from(level)).copied().unwrap_or(0));
         let search = Search { at: map.apply(from), radius_squared: radius * radius, levels };
         let best = match shortlist.of(number) {
-            Some(entries) => kernels.closest(entries, search),
+            Some(blocks) => kernels.closest(blocks, search),
             None => closest_in_grid(pairing, number, commonness, search, radius),
         };
         let query = NUMBER_LIMIT - (best & NUMBER_LIMIT);

@@ -2,8 +2,7 @@
 //!
 //! `f32` with `+ - * /` in a fixed order; the 8 x 8 system of the homography is solved in `f64`.
 
-use nalgebra::{SMatrix, SVector};
-
+use crate::linear::NormalEquations;
 use crate::math::sqrt;
 
 /// `y = L x + t`, an affine map of pixels to pixels.
@@ -18,10 +17,7 @@ pub struct Affine {
 impl Affine {
     /// Scales by `scale` and takes the point `from` to the point `to`.
     pub fn upright(scale: f32, from: [f32; 2], to: [f32; 2]) -> Self {
-        Self {
-            linear: [[scale, 0.0], [0.0, scale]],
-            translation: [to[0] - scale * from[0], to[1] - scale * from[1]],
-        }
+        Self { linear: [[scale, 0.0], [0.0, scale]], translation: [to[0] - scale * from[0], to[1] - scale * from[1]] }
     }
 
     /// The image of a point.
@@ -188,35 +184,24 @@ pub fn fit_homography(
     target: Normalization,
     ridge: f64,
 ) -> Option<Homography> {
-    let mut normal = SMatrix::<f64, 8, 8>::zeros();
-    let mut right = SVector::<f64, 8>::zeros();
+    let mut equations = NormalEquations::<8>::new();
     for pair in pairs {
         let ([x, y], [u, v]) = (source.apply(pair.from), target.apply(pair.to));
         let weight = f64::from(pair.weight);
-        for (row, value) in [
-            (SVector::from([x, y, 1.0, 0.0, 0.0, 0.0, -u * x, -u * y]), u),
-            (SVector::from([0.0, 0.0, 0.0, x, y, 1.0, -v * x, -v * y]), v),
-        ] {
-            let weighted = row * weight;
-            normal += weighted * row.transpose();
-            right += weighted * value;
-        }
+        equations.add(&[x, y, 1.0, 0.0, 0.0, 0.0, -u * x, -u * y], u, weight);
+        equations.add(&[0.0, 0.0, 0.0, x, y, 1.0, -v * x, -v * y], v, weight);
     }
-    for i in 6..8 {
-        normal[(i, i)] += ridge;
+    for perspective in 6..8 {
+        equations.add_ridge(perspective, ridge);
     }
-    let h = normal.cholesky()?.solve(&right);
-    let [a, b, c, d, e, f, g, i]: [f64; 8] = h.into();
+    let &[a, b, c, d, e, f, g, i] = equations.solve()?;
     // H = T_target^-1 h T_source
     let (s, t) = (f64::from(source.half_side), f64::from(target.half_side));
     let [sx, sy] = source.centre.map(f64::from);
     let [tx, ty] = target.centre.map(f64::from);
-    let rows = [
-        [t * a + tx * g, t * b + tx * i, t * c + tx],
-        [t * d + ty * g, t * e + ty * i, t * f + ty],
-        [g, i, 1.0],
-    ]
-    .map(|[p, q, r]| [p / s, q / s, r - (p * sx + q * sy) / s]);
+    let rows =
+        [[t * a + tx * g, t * b + tx * i, t * c + tx], [t * d + ty * g, t * e + ty * i, t * f + ty], [g, i, 1.0]]
+            .map(|[p, q, r]| [p / s, q / s, r - (p * sx + q * sy) / s]);
     let scale = rows[2][2];
     if !(scale > 1e-9) {
         return None;

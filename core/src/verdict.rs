@@ -6,8 +6,8 @@
 //! as an integer logarithm.
 
 use crate::evidence::EVIDENCE_UNIT;
-use crate::math::{exp2, log2_q8};
 use crate::matcher::ViewMatch;
+use crate::math::{exp2, log2_q8};
 use crate::profile::Profile;
 
 /// Frames with fewer corners are not compared with anything.
@@ -176,7 +176,8 @@ impl Ranking {
             None => Verdict::Unknown(NoAnswer::NothingFits),
             Some(best) if !passes(&best) => Verdict::Unknown(NoAnswer::NotSure(best)),
             Some(best) => {
-                let close = |other: &Answer| best.matched.evidence.saturating_sub(other.matched.evidence) < AMBIGUOUS_WITHIN;
+                let close =
+                    |other: &Answer| best.matched.evidence.saturating_sub(other.matched.evidence) < AMBIGUOUS_WITHIN;
                 match runner_up.filter(|other| passes(other) && close(other)) {
                     Some(other) => Verdict::Ambiguous(best, other),
                     None => Verdict::Known(best),

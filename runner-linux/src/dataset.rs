@@ -128,8 +128,7 @@ impl Dataset {
                 return Err(DatasetError::NoSuchBuilding(path.to_owned(), name.clone()));
             }
             // Groups that share a name are one group; the least name stands for it.
-            let roots: BTreeSet<String> =
-                group.iter().map(|name| same.get(name).unwrap_or(name).clone()).collect();
+            let roots: BTreeSet<String> = group.iter().map(|name| same.get(name).unwrap_or(name).clone()).collect();
             let Some(least) = roots.first().cloned() else { continue };
             for root in same.values_mut().filter(|root| roots.contains(*root)) {
                 root.clone_from(&least);
@@ -193,8 +192,8 @@ impl fmt::Display for DatasetError {
                 let folder = path.parent().unwrap_or(Path::new("."));
                 write!(
                     out,
-                    "{} pictures that {} names are not there; put them into {}, or take them out of the manifest:{shown}{rest}",
-                    missing.len(),
+                    "{} that {} names cannot be found; put what is missing into {}, or take it out of the manifest:{shown}{rest}",
+                    crate::report::phrase::count(missing.len(), "picture"),
                     path.display(),
                     folder.display()
                 )

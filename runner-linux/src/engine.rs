@@ -41,8 +41,8 @@ pub const QUERY_FEATURES: usize = 800;
 const STRIP: usize = 256;
 const SLOTS: usize = selection(Profile::Handheld).query.slots();
 
-type HandheldRecognizer = Recognizer<100, 200, 8_192, QUERY_FEATURES>;
-type BoardRecognizer = Recognizer<800, 800, 32_768, QUERY_FEATURES>;
+type HandheldRecognizer = Recognizer<100, 200, 512, QUERY_FEATURES>;
+type BoardRecognizer = Recognizer<800, 800, 4_096, QUERY_FEATURES>;
 
 #[derive(Debug)]
 enum AnyRecognizer {

@@ -6,7 +6,7 @@
 #![allow(unsafe_code, reason = "calling a function with a target feature, after asking the processor for it")]
 
 use daymark_core::feature::Signature;
-use daymark_core::kernel::{self, BoxSums, Kernels, Nearest, Patch, Search, Seed, ShortColumns, VoteColumns};
+use daymark_core::kernel::{self, BoxSums, Kernels, LookAlikes, Nearest, Patch, Search, Seed, VoteColumns};
 
 /// The kernels of one processor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -25,7 +25,11 @@ impl Processor {
     /// The fastest kernels that run here. `DAYMARK_KERNELS=portable` or `avx2` asks for less, to compare.
     pub fn detect() -> Self {
         let wanted = std::env::var("DAYMARK_KERNELS").unwrap_or_default();
-        Self::available().into_iter().rev().find(|kernels| wanted.is_empty() || wanted == kernels.name()).unwrap_or(Self::Portable)
+        Self::available()
+            .into_iter()
+            .rev()
+            .find(|kernels| wanted.is_empty() || wanted == kernels.name())
+            .unwrap_or(Self::Portable)
     }
 
     /// All kernels that run here, the fastest last.
@@ -97,7 +101,7 @@ macro_rules! all_kernels {
             distances(signature: Signature, others: &[Signature], out: &mut [u8]);
             count_below(values: &[u8], limit: u8) -> u32;
             each_at_most(values: &[u8], limit: u8, found: &mut dyn FnMut(usize));
-            closest(entries: ShortColumns<'_>, search: Search) -> i32;
+            closest(blocks: &[LookAlikes], search: Search) -> i32;
             nearest_three(row: &[u8], limit: u8) -> Nearest;
             votes(seed: Seed, columns: VoteColumns<'_>, agrees: &mut [u8]) -> i32;
         }

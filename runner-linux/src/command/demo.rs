@@ -140,9 +140,10 @@ fn recognize_all(
     lens: Lens,
 ) -> Result<Vec<Seen>, CommandError> {
     let files: Vec<String> = shots.iter().map(|shot| format!("frames/{}.png", shot.name)).collect();
-    shots.par_iter().zip(&files).try_for_each(|(shot, file)| {
-        write_png(&out.join(file), &scene::render(shot, lens), lens)
-    })?;
+    shots
+        .par_iter()
+        .zip(&files)
+        .try_for_each(|(shot, file)| write_png(&out.join(file), &scene::render(shot, lens), lens))?;
     let mut engine = Engine::new(table.profile());
     let mut seen = Vec::new();
     for (shot, frame_file) in shots.into_iter().zip(files) {
@@ -224,9 +225,12 @@ fn answer(finding: &Finding) -> String {
     match (&finding.landmark, &finding.best, &finding.reason) {
         (Some(name), Some(best), _) => {
             let p = phrase::probability(best.probability_false_answer);
-            format!("-> {name}; false with {p} ({:.0} bits of evidence), {time}", best.evidence_bits)
+            format!(
+                "-> {name}; probability that this is false: {p} ({:.0} bits of evidence); {time}",
+                best.evidence_bits
+            )
         }
-        (_, _, Some(reason)) => format!("-> {}: {}, {time}", finding.verdict.label().to_lowercase(), reason.message),
+        (_, _, Some(reason)) => format!("-> {}: {}; {time}", finding.verdict.label().to_lowercase(), reason.message),
         _ => format!("-> {}, {time}", finding.verdict.label().to_lowercase()),
     }
 }

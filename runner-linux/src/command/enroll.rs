@@ -14,10 +14,10 @@ use rayon::prelude::*;
 use super::{CommandError, Outcome};
 use crate::engine::Engine;
 use crate::enroll::lint::{LintError, ViewLint, lint};
+use crate::enroll::manifest;
 use crate::enroll::plan::{Plan, check_name, read_pictures};
 use crate::enroll::position::{GIVEN_ERROR_METRES, parse_degrees, position};
 use crate::enroll::update::{Change, Enrolled, apply};
-use crate::enroll::manifest;
 use crate::table_file::{OwnedTable, TableFileError, open_table, read_table, replace_file};
 
 /// Arguments of `daymark enroll`.
@@ -100,8 +100,11 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     let pictures = pool.install(|| read_pictures(&plans, profile, &|| progress.inc(1)))?;
     progress.finish_and_clear();
 
-    let changes: Vec<Change> =
-        plans.into_iter().zip(pictures).map(|(plan, pictures)| apply(&mut table, plan, pictures, args.replace)).collect();
+    let changes: Vec<Change> = plans
+        .into_iter()
+        .zip(pictures)
+        .map(|(plan, pictures)| apply(&mut table, plan, pictures, args.replace))
+        .collect();
     let bytes = table.to_bytes().map_err(TableFileError::Build)?;
     let new = open_table(&args.table, &bytes)?;
     let lints = if args.no_lint { Vec::new() } else { pool.install(|| lint_all(new, &changes))? };
@@ -125,13 +128,8 @@ fn plans(args: &Args) -> Result<Vec<Plan>, CommandError> {
     let name = args.name.clone().unwrap_or_default();
     check_name(&name).map_err(|says| format!("the name {name:?} cannot be used: {says}"))?;
     let at = args.at.map(|Degrees([latitude, longitude])| position(latitude, longitude, args.position_error));
-    let plan = Plan {
-        name,
-        kind: args.kind,
-        position: at.transpose()?,
-        images: args.images.clone(),
-        origin: String::new(),
-    };
+    let plan =
+        Plan { name, kind: args.kind, position: at.transpose()?, images: args.images.clone(), origin: String::new() };
     Ok(vec![plan])
 }
 

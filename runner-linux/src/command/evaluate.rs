@@ -66,7 +66,10 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     if let Some(path) = &args.html {
         let page = html::page(&evaluation, &|file| measure::read(&dataset.folder, file).ok());
         std::fs::write(path, page).map_err(|error| {
-            format!("cannot write the page {}: {error}; give a path in a folder that exists and is yours", path.display())
+            format!(
+                "cannot write the page {}: {error}; give a path in a folder that exists and is yours",
+                path.display()
+            )
         })?;
     }
     let mut out = io::stdout().lock();

@@ -176,11 +176,8 @@ fn look(
 
     let mut finding = Finding::new(path, &frame, &recognition, &table)?;
     let ms = |from: Instant, to: Instant| (to - from).as_secs_f64() * 1e3;
-    finding.times = Some(Times {
-        read_ms: ms(begin, read),
-        features_ms: ms(read, extracted),
-        matching_ms: ms(extracted, matched),
-    });
+    finding.times =
+        Some(Times { read_ms: ms(begin, read), features_ms: ms(read, extracted), matching_ms: ms(extracted, matched) });
     if args.explain {
         let (best, runner_up) = (recognition.best.as_ref(), recognition.runner_up.as_ref());
         finding.explanation = Some(Explained::new(engine, &table, best, runner_up)?);
@@ -196,15 +193,13 @@ fn look(
     Ok(finding)
 }
 
-fn draw(
-    file: &Path,
-    frame: &GrayImage,
-    finding: &Finding,
-    best: Option<&ViewExplanation>,
-) -> Result<(), CommandError> {
+fn draw(file: &Path, frame: &GrayImage, finding: &Finding, best: Option<&ViewExplanation>) -> Result<(), CommandError> {
     let svg = Overlay { frame, finding, best, stored_picture: None }.to_svg();
     std::fs::write(file, svg).map_err(|error| {
-        format!("cannot write the overlay {}: {error}; give a path in a folder that exists and is yours", file.display())
+        format!(
+            "cannot write the overlay {}: {error}; give a path in a folder that exists and is yours",
+            file.display()
+        )
     })?;
     Ok(())
 }

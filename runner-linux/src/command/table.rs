@@ -1,7 +1,7 @@
 //! `daymark table`: look into, check, merge and change landmark tables.
 
-pub(super) mod facts;
 mod change;
+pub(super) mod facts;
 mod inspect;
 mod near;
 

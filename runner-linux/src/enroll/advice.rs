@@ -50,7 +50,7 @@ pub struct Warning {
 
 /// What good views give in the median and in the worst of their simulated views, in multiples of what an answer usually
 /// needs. Of 74 good photographs of 65 buildings one is below in each profile; of eight of them blurred by
-/// 6 px, at a quarter of their size, or at 5 % of their light, nearly all.
+/// 6 px, at a quarter of their size, or at 5 % of their light, most or all.
 const fn good(profile: Profile) -> [f64; 2] {
     match profile {
         Profile::Board => [26.0, 15.0],
@@ -107,12 +107,12 @@ pub fn warnings(building: &str, image: &str, lint: &ViewLint, profile: Profile) 
     }
     let share = lint.repetition.corners as f64 / corners.max(1) as f64;
     if share >= REPEATS {
-        let [right, down] = lint.repetition.shift_pixel;
         warn(
             Weakness::Repetitive,
             format!(
-                "{} of {corners} corners look the same {right} px to the right and {down} px down: a pattern repeats",
-                lint.repetition.corners
+                "{} of {corners} corners look the same {}: a pattern repeats",
+                lint.repetition.corners,
+                direction(lint.repetition.shift_pixel)
             ),
             "take another picture with the pattern's end in it: a roof line, a door, a corner of the building",
         );
@@ -125,4 +125,15 @@ pub fn warnings(building: &str, image: &str, lint: &ViewLint, profile: Profile) 
         );
     }
     found
+}
+
+/// A shift in words.
+fn direction([x, y]: [i32; 2]) -> String {
+    let across = format!("{} px to the {}", x.abs(), if x < 0 { "left" } else { "right" });
+    let along = format!("{} px {}", y.abs(), if y < 0 { "up" } else { "down" });
+    match (x, y) {
+        (_, 0) => across,
+        (0, _) => along,
+        _ => format!("{across} and {along}"),
+    }
 }

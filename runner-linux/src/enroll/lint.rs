@@ -113,7 +113,7 @@ pub fn lint(
     Ok(ViewLint {
         needed_bits: bits(needed(calibration, views)),
         usually_needed_bits: bits(needed(calibration, USUAL_VIEWS)),
-        median_bits: bits((simulated[(CHANGES.len() - 1) / 2] + simulated[CHANGES.len() / 2]) / 2),
+        median_bits: bits(i32::midpoint(simulated[(CHANGES.len() - 1) / 2], simulated[CHANGES.len() / 2])),
         worst_bits: bits(simulated[0]),
         lookalikes: lookalikes.into_iter().map(|(_, lookalike)| lookalike).collect(),
         mirror_bits: bits(mirror),

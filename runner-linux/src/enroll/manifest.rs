@@ -45,8 +45,11 @@ struct Building {
 /// # Errors
 /// [`ManifestError`], which names the file and, where there is one, the line.
 pub fn read(path: &Path) -> Result<Vec<Plan>, ManifestError> {
-    let text = std::fs::read_to_string(path)
-        .map_err(|error| ManifestError { path: path.to_owned(), line: None, says: unreadable(&error) })?;
+    let text = std::fs::read_to_string(path).map_err(|error| ManifestError {
+        path: path.to_owned(),
+        line: None,
+        says: unreadable(&error),
+    })?;
     parse(path, &text)
 }
 
@@ -75,7 +78,8 @@ fn parse(path: &Path, text: &str) -> Result<Vec<Plan>, ManifestError> {
         let wrong = |span, says: &str| fail(Some(line_of(span)), format!("building {name:?}: {says}"));
         check_name(&name).map_err(|says| fail(Some(line), format!("building {name:?}: {says}")))?;
         if let Some(first) = lines.insert(name.clone(), line) {
-            let says = format!("building {name:?} is in line {first} already; put all its pictures there, or rename one");
+            let says =
+                format!("building {name:?} is in line {first} already; put all its pictures there, or rename one");
             return Err(fail(Some(line), says));
         }
         let kind = kind.map(|kind| {
@@ -168,12 +172,18 @@ mod tests {
             (one("images = []"), "line 3: building \"Mill\": it has no pictures"),
             (one("images = \"a.jpg\""), "line 3: invalid type: string"),
             (one("image = [\"a.jpg\"]"), "line 3: unknown field `image`"),
-            (one("kind = \"mill\"\nimages = [\"a\"]"), "line 3: building \"Mill\": there is no kind \"mill\"; the kinds"),
+            (
+                one("kind = \"mill\"\nimages = [\"a\"]"),
+                "line 3: building \"Mill\": there is no kind \"mill\"; the kinds",
+            ),
             (one("at = [1]\nimages = [\"a\"]"), "line 3: invalid length 1"),
             (one("at = [91, 0]\nimages = [\"a\"]"), "line 3: building \"Mill\": the latitude 91"),
             (one("at = [1, 0]\nposition_error = -1\nimages = [\"a\"]"), "the position error -1"),
             (one("position_error = 1\nimages = [\"a\"]"), "line 3: building \"Mill\": it has a position_error without"),
-            (one("images = [\"a\"]\n[[building]]\nname = \"Mill\"\nimages = [\"b\"]"), "line 5: building \"Mill\" is in line 2"),
+            (
+                one("images = [\"a\"]\n[[building]]\nname = \"Mill\"\nimages = [\"b\"]"),
+                "line 5: building \"Mill\" is in line 2",
+            ),
             (said("[[building]\nname = 1"), "line 1: "),
         ];
         for (said, expected) in expected {

@@ -87,10 +87,8 @@ impl<'a, K: Kernels> Reader<'a, K> {
     fn read(&mut self, image: &GrayImage, front_end: FrontEnd) -> Vec<Feature> {
         self.levels.resize(level_bytes(image.width, image.height), 0);
         self.toned.resize(image.width * image.height, 0);
-        let extracted = image
-            .view()
-            .and_then(|view| TonedFrame::write(self.kernels, view, &mut self.toned))
-            .and_then(|toned| {
+        let extracted =
+            image.view().and_then(|view| TonedFrame::write(self.kernels, view, &mut self.toned)).and_then(|toned| {
                 self.extractor.extract(self.kernels, toned, front_end, &mut self.levels, &mut self.features)
             });
         if extracted.is_ok() { self.features.view().iter().collect() } else { Vec::new() }
@@ -106,9 +104,7 @@ fn observe(candidate: &mut Candidate, [x, y]: [f64; 2], map_scale: f32, found: &
         let [px, py] = feature.position.to_pixels();
         let (dx, dy) = (f64::from(px) - x, f64::from(py) - y);
         let radius = f64::from(3.0 + 1.2 * size);
-        dx * dx + dy * dy < radius * radius
-            && size < expected * SCALE_TOLERANCE
-            && expected < size * SCALE_TOLERANCE
+        dx * dx + dy * dy < radius * radius && size < expected * SCALE_TOLERANCE && expected < size * SCALE_TOLERANCE
     };
     let distance = |feature: &Feature| candidate.feature.signature.distance(feature.signature);
     let Some(least) = found.iter().filter(|feature| is_here(feature)).map(distance).min() else { return };

@@ -69,8 +69,12 @@ pub enum PositionFrom {
 pub fn apply(table: &mut OwnedTable, plan: Plan, pictures: Vec<Picture>, replace: bool) -> Change {
     let index = table.landmarks.iter().position(|landmark| landmark.name == plan.name);
     let index = index.unwrap_or_else(|| {
-        let entry =
-            LandmarkEntry { name: plan.name.clone(), kind: plan.kind.unwrap_or(KIND), position: None, views: Vec::new() };
+        let entry = LandmarkEntry {
+            name: plan.name.clone(),
+            kind: plan.kind.unwrap_or(KIND),
+            position: None,
+            views: Vec::new(),
+        };
         table.landmarks.push(entry);
         table.landmarks.len() - 1
     });

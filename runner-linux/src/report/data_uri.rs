@@ -10,8 +10,7 @@ use crate::picture::GrayImage;
 pub fn png(image: &GrayImage) -> String {
     let mut bytes = Vec::new();
     let encoder = PngEncoder::new_with_quality(&mut bytes, CompressionType::Default, FilterType::Adaptive);
-    let encoded =
-        encoder.write_image(&image.pixels, image.width as u32, image.height as u32, ExtendedColorType::L8);
+    let encoded = encoder.write_image(&image.pixels, image.width as u32, image.height as u32, ExtendedColorType::L8);
     if encoded.is_ok() { format!("data:image/png;base64,{}", base64(&bytes)) } else { String::new() }
 }
 
@@ -47,7 +46,8 @@ mod tests {
 
     #[test]
     fn base64_gives_the_vectors_of_rfc_4648() {
-        let cases = [("", ""), ("f", "Zg=="), ("fo", "Zm8="), ("foo", "Zm9v"), ("foob", "Zm9vYg=="), ("fooba", "Zm9vYmE=")];
+        let cases =
+            [("", ""), ("f", "Zg=="), ("fo", "Zm8="), ("foo", "Zm9v"), ("foob", "Zm9vYg=="), ("fooba", "Zm9vYmE=")];
         for (bytes, text) in cases {
             assert_eq!(base64(bytes.as_bytes()), text);
         }

@@ -25,7 +25,7 @@ pub enum Said {
     /// It was found, with little to tell it from others.
     Weak,
     /// Its place is in the frame, and it says nothing either way.
-    Nothing,
+    Silent,
     /// Another corner is at its place.
     Unlike,
     /// Nothing is at its place, or what is there supports another stored corner.
@@ -34,7 +34,7 @@ pub enum Said {
 
 impl Said {
     /// All of them, the best first.
-    pub const ALL: [Self; 6] = [Self::Strong, Self::Fair, Self::Weak, Self::Nothing, Self::Unlike, Self::Missing];
+    pub const ALL: [Self; 6] = [Self::Strong, Self::Fair, Self::Weak, Self::Silent, Self::Unlike, Self::Missing];
 
     /// How it is called in a report.
     pub const fn name(self) -> &'static str {
@@ -42,7 +42,7 @@ impl Said {
             Self::Strong => "strong",
             Self::Fair => "fair",
             Self::Weak => "weak",
-            Self::Nothing => "says nothing",
+            Self::Silent => "silent",
             Self::Unlike => "unlike",
             Self::Missing => "missing",
         }
@@ -53,7 +53,7 @@ impl Said {
             (Some(_), bits) if bits >= STRONG_BITS => Self::Strong,
             (Some(_), bits) if bits >= FAIR_BITS => Self::Fair,
             (_, bits) if bits > 0.0 => Self::Weak,
-            (_, 0.0) => Self::Nothing,
+            (_, 0.0) => Self::Silent,
             (Some(_), _) => Self::Unlike,
             (None, _) => Self::Missing,
         }

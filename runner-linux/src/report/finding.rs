@@ -216,7 +216,8 @@ fn look_alikes(best: Option<&Candidate>, other: Option<&Candidate>) -> Reason {
     Reason {
         code: "look_alikes",
         message: format!("{} and {} fit about equally well", name(best), name(other)),
-        advice: "show more of what only one of them has; if they are one building, enroll both under one name".to_owned(),
+        advice: "show more of what only one of them has; if they are one building, enroll both under one name"
+            .to_owned(),
     }
 }
 

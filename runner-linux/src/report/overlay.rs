@@ -43,7 +43,7 @@ pub(super) const fn colour(said: Said) -> &'static str {
         Said::Strong => "#ffd34d",
         Said::Fair => "#4ade9b",
         Said::Weak => "#5aa9ff",
-        Said::Nothing => "#8593a8",
+        Said::Silent => "#8593a8",
         Said::Unlike => "#ff5f6d",
         Said::Missing => "#d98ae0",
     }
@@ -95,10 +95,10 @@ impl Overlay<'_> {
             .add(Rectangle::new().set("width", "100%").set("height", "100%").set("fill", NIGHT))
             .add(Definitions::new().add(ClipPath::new().set("id", "frame").add(rectangle(frame))))
             .add(self.caption())
-            .add(picture(frame, self.frame));
+            .add(picture(frame, data_uri::png(self.frame)));
         if let (Some(place), Some(best)) = (stored, self.best) {
             let stars = match self.stored_picture {
-                Some(image) => Group::new().add(picture(place, image)),
+                Some(image) => Group::new().add(picture(place, data_uri::jpeg(image))),
                 None => Group::new().add(rectangle(place).set("fill", PANEL).set("rx", 6)),
             };
             let inside = Group::new()
@@ -171,14 +171,14 @@ fn rectangle(place: Place) -> Rectangle {
         .set("height", format!("{:.1}", place.height))
 }
 
-fn picture(place: Place, image: &GrayImage) -> Image {
+fn picture(place: Place, address: String) -> Image {
     Image::new()
         .set("x", format!("{:.1}", place.x))
         .set("y", format!("{:.1}", place.y))
         .set("width", format!("{:.1}", place.width))
         .set("height", format!("{:.1}", place.height))
         .set("preserveAspectRatio", "none")
-        .set("href", data_uri::png(image))
+        .set("href", address)
 }
 
 fn circle([x, y]: [f32; 2], radius: f32) -> Circle {
@@ -214,8 +214,8 @@ fn outline(best: &ViewExplanation, frame: Place) -> Group {
     };
     Group::new()
         .set("class", "outline")
-        .add(polygon(NIGHT, 5.0).set("stroke-opacity", 0.6))
-        .add(polygon("#ffffff", 2.0).set("stroke-dasharray", "9 5"))
+        .add(polygon(NIGHT, 6.0).set("stroke-opacity", 0.55))
+        .add(polygon("#ffffff", 2.5))
 }
 
 /// Size of a star: the level of its corner.

@@ -89,7 +89,13 @@ impl Plot {
             .set("height", HEIGHT)
             .set("role", "img")
             .set("style", "max-width:100%;height:auto")
-            .add(Rectangle::new().set("width", WIDTH).set("height", HEIGHT).set("rx", 10).set("fill", "var(--card, #fff)"))
+            .add(
+                Rectangle::new()
+                    .set("width", WIDTH)
+                    .set("height", HEIGHT)
+                    .set("rx", 10)
+                    .set("fill", "var(--card, #fff)"),
+            )
             .add(text(&self.title, [LEFT, 26.0], 14, "start").set("font-weight", 600))
             .add(self.grid());
         for curve in &self.curves {
@@ -114,7 +120,8 @@ impl Plot {
 
     fn grid(&self) -> Group {
         let mut grid = Group::new();
-        let rule = |from: [f64; 2], to: [f64; 2]| line(from, to).set("stroke", "var(--line, #ddd)").set("stroke-width", 1);
+        let rule =
+            |from: [f64; 2], to: [f64; 2]| line(from, to).set("stroke", "var(--line, #ddd)").set("stroke-width", 1);
         for (value, name) in &self.x.ticks {
             let [x, bottom] = self.point([*value, self.y.from]);
             grid = grid.add(rule([x, TOP], [x, bottom])).add(pale(name, [x, bottom + 17.0], "middle"));
@@ -135,7 +142,13 @@ impl Plot {
         let end = if x > WIDTH - 90.0 { ([x - 9.0, y + 17.0], "end") } else { ([x + 9.0, y + 17.0], "start") };
         Group::new()
             .add(line(low, high).set("stroke", colour).set("stroke-width", 2).set("stroke-opacity", 0.55))
-            .add(Circle::new().set("cx", format!("{x:.1}")).set("cy", format!("{y:.1}")).set("r", 4.5).set("fill", colour))
+            .add(
+                Circle::new()
+                    .set("cx", format!("{x:.1}"))
+                    .set("cy", format!("{y:.1}"))
+                    .set("r", 4.5)
+                    .set("fill", colour),
+            )
             .add(pale(&mark.remark, end.0, end.1))
     }
 }

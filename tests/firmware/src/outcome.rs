@@ -2,16 +2,16 @@
 
 use daymark_core::image::FrameError;
 use daymark_core::table::{EncodeError, StreamError, TableError};
-use daymark_core::verdict::Recognition;
 
-/// The answers of both readers, which must be the same.
+/// A round in short; the answers themselves go to where the device shows them.
 #[derive(Clone, Copy)]
-#[cfg_attr(target_os = "none", expect(dead_code, reason = "the fields are for whoever looks at the memory"))]
 pub struct Outcome {
-    /// From the table in place.
-    pub in_place: Recognition,
-    /// From the streamed table.
-    pub streamed: Recognition,
+    /// The frame shows what was enrolled.
+    pub known: bool,
+    /// Both readers gave the same answer.
+    pub same: bool,
+    /// Corners of the frame.
+    pub corners: usize,
     /// Stored corners that had something to say.
     pub explained: usize,
     /// Bytes of the best landmark's name.

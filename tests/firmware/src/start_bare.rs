@@ -38,7 +38,7 @@ fn start() -> ! {
     let mut device = unsafe { Device::take() };
     loop {
         device.expose();
-        let outcome = crate::run(&device);
+        let outcome = crate::run(&mut device);
         device.report(outcome);
     }
 }

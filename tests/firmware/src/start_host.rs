@@ -4,8 +4,7 @@ use core::ffi::{c_char, c_int};
 use core::hint::black_box;
 use core::ptr;
 
-use daymark_core::verdict::Verdict;
-
+use crate::STACK;
 use crate::device::Device;
 
 #[link(name = "c")]
@@ -25,7 +24,7 @@ extern "C" fn main(_: c_int, _: *const *const c_char) -> c_int {
     let mut device = unsafe { Device::take() };
     device.expose();
     let bottom = paint();
-    let outcome = crate::run(&device);
+    let outcome = crate::run(&mut device);
     let stack = used(bottom);
     device.report(outcome);
     let Ok(outcome) = outcome else {
@@ -33,20 +32,19 @@ extern "C" fn main(_: c_int, _: *const *const c_char) -> c_int {
         unsafe { printf(c"the round failed\n".as_ptr()) };
         return 1;
     };
-    let known = matches!(outcome.in_place.verdict, Verdict::Known(_));
-    let same = outcome.in_place == outcome.streamed;
     // SAFETY: the format has two numbers and three integers.
     unsafe {
         printf(
             c"the round: known %d, both readers agree %d, corners in the frame %d, explained %d, stack %zu bytes\n".as_ptr(),
-            c_int::from(known),
-            c_int::from(same),
-            outcome.in_place.corners as c_int,
+            c_int::from(outcome.known),
+            c_int::from(outcome.same),
+            outcome.corners as c_int,
             outcome.explained as c_int,
             stack,
         );
     }
-    c_int::from(!(known && same && outcome.explained > 0 && outcome.name_bytes > 0 && stack <= 64 * 1_024))
+    let right = outcome.known && outcome.same && outcome.explained > 0 && outcome.name_bytes > 0;
+    c_int::from(!(right && stack <= STACK))
 }
 
 /// Paints the stack below this call, and returns the address of its lowest painted byte.

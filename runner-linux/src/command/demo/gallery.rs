@@ -42,8 +42,8 @@ fn write_body(
             Lesson::Known,
             "Known",
             "Left the stored view, right the frame. Rings are corners that were found again; the gold ones are strong \
-             evidence, and a line leads to each from its place in the stored view. The dashed outline is the stored \
-             view as the frame shows it.",
+             evidence, and a line leads to each from its place in the stored view. The white outline is the stored \
+             view as the frame shows it; crosses are stored corners that were not found.",
         ),
         (
             Lesson::Twin,

@@ -150,7 +150,10 @@ pub(super) fn recognize(
             answer.map(|answer| {
                 table.landmark(answer.landmark).map(|landmark| Guess {
                     building: landmark.name.to_owned(),
-                    gallery_file: gallery.views.get(answer.view as usize).map_or(String::new(), |view| view.file.clone()),
+                    gallery_file: gallery
+                        .views
+                        .get(answer.view as usize)
+                        .map_or(String::new(), |view| view.file.clone()),
                     evidence_bits: crate::report::finding::bits(answer.matched.evidence),
                     probability_false_answer: answer.false_answer.probability(),
                     frame_from_view: answer.matched.frame_from_view.0,
@@ -213,9 +216,7 @@ fn has_two_answers(recognition: &Recognition, limits: &[FalseAnswer]) -> bool {
 /// The verdict at another limit, if the runner-up does not pass it.
 fn only_answer(recognition: &Recognition, limit: FalseAnswer) -> Verdict {
     match (recognition.verdict, recognition.best) {
-        (Verdict::Known(_) | Verdict::Unknown(NoAnswer::NotSure(_)), Some(best))
-            if best.false_answer <= limit =>
-        {
+        (Verdict::Known(_) | Verdict::Unknown(NoAnswer::NotSure(_)), Some(best)) if best.false_answer <= limit => {
             Verdict::Known(best)
         }
         (Verdict::Known(_), Some(best)) => Verdict::Unknown(NoAnswer::NotSure(best)),

@@ -1,5 +1,6 @@
 //! `daymark table merge` and `remove`.
 
+use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -75,7 +76,11 @@ pub(super) fn merge(args: &Merge<'_>, json: bool) -> Result<(), CommandError> {
         return Err(format!(
             "{} in several of the tables: {}{more}. Say --on-duplicate join to keep the views of all, or keep-first to \
              keep those of the first table; nothing was written",
-            if duplicates.len() == 1 { "this landmark is".to_owned() } else { format!("{} landmarks are", duplicates.len()) },
+            if duplicates.len() == 1 {
+                "this landmark is".to_owned()
+            } else {
+                format!("{} landmarks are", duplicates.len())
+            },
             names.join(", ")
         )
         .into());
@@ -88,7 +93,7 @@ pub(super) fn merge(args: &Merge<'_>, json: bool) -> Result<(), CommandError> {
         let mut text = format!("merged {}\n", count(args.tables.len(), "table"));
         let what = if args.on_duplicate == OnDuplicate::Join { "views joined" } else { "the first kept" };
         for name in &document.duplicates {
-            text += &format!("  {}: in several tables, {what}\n", printable(name));
+            let _ = writeln!(text, "  {}: in several tables, {what}", printable(name));
         }
         text + &document.table.line() + "\n"
     })
@@ -141,7 +146,7 @@ pub(super) fn remove(path: &Path, names: &[String], json: bool) -> Result<(), Co
     print(json, &document, || {
         let mut text = String::new();
         for Removed { landmark, views } in &document.removed {
-            text += &format!("removed {}: {}\n", printable(landmark), count(*views, "view"));
+            let _ = writeln!(text, "removed {}: {}", printable(landmark), count(*views, "view"));
         }
         text + &document.table.line() + "\n"
     })

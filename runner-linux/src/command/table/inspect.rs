@@ -1,5 +1,6 @@
 //! `daymark table list`, `show` and `verify`.
 
+use std::fmt::Write as _;
 use std::path::Path;
 
 use daymark_core::table::{Header, LandmarkTable};
@@ -37,7 +38,7 @@ pub(super) fn list(path: &Path, json: bool) -> Result<(), CommandError> {
         for LandmarkFacts { landmark, kind, position, views, bytes } in &document.landmarks {
             let at = position.as_ref().map_or_else(String::new, |at| format!("  {}", place(at)));
             let (views, bytes) = (count(*views, "view"), grouped(*bytes as u64));
-            text += &format!("  {:width$}  {kind:10}  {views:>9}  {bytes:>9} bytes{at}\n", printable(landmark));
+            let _ = writeln!(text, "  {:width$}  {kind:10}  {views:>9}  {bytes:>9} bytes{at}", printable(landmark));
         }
         text
     })
@@ -66,15 +67,16 @@ pub(super) fn show(path: &Path, name: &str, json: bool) -> Result<(), CommandErr
         let LandmarkFacts { landmark, kind, position, views, bytes } = &document.landmark;
         let (views, bytes) = (count(*views, "view"), grouped(*bytes as u64));
         let mut text = format!("{}: {kind}, {views}, {bytes} bytes\n", printable(landmark));
-        text += &match position {
-            Some(at) => format!("  stands at {}\n", place(at)),
-            None => "  position unknown; `daymark enroll --at` tells the table\n".to_owned(),
+        let _ = match position {
+            Some(at) => writeln!(text, "  stands at {}", place(at)),
+            None => writeln!(text, "  position unknown; `daymark enroll --at` tells the table"),
         };
         for ViewFacts { view, width_px, height_px, corners, corners_per_level, bytes } in &document.view_list {
             let levels = corners_per_level.map(|corners| corners.to_string()).join(" + ");
             let bytes = grouped(*bytes as u64);
-            text += &format!(
-                "  view {view}: {width_px} x {height_px} px, {corners} corners ({levels}, finest level first), {bytes} bytes\n"
+            let _ = writeln!(
+                text,
+                "  view {view}: {width_px} x {height_px} px, {corners} corners ({levels}, finest level first), {bytes} bytes"
             );
         }
         text

@@ -139,7 +139,10 @@ fn stated_table(evaluation: &Evaluation) -> String {
         let counts = [row.right, row.wrong, row.ambiguous, row.unknown].map(|count| count.to_string());
         [probability(row.stated), accepted].into_iter().chain(counts).collect()
     });
-    table(&["stated, at most", "negatives accepted", "right", "wrong", "ambiguous", "unknown"], &rows.collect::<Vec<_>>())
+    table(
+        &["stated, at most", "negatives accepted", "right", "wrong", "ambiguous", "unknown"],
+        &rows.collect::<Vec<_>>(),
+    )
 }
 
 fn source_table(evaluation: &Evaluation) -> String {
@@ -163,15 +166,21 @@ fn source_table(evaluation: &Evaluation) -> String {
 fn write_pictures(out: &mut String, evaluation: &Evaluation, read: Read<'_>) -> std::fmt::Result {
     let limit = probability(evaluation.settings.max_false_answer);
     let sections: [(&str, String, bool, &dyn Fn(&Judged) -> bool); 3] = [
-        ("False answers", format!("Negatives and queries for which a wrong building was named at {limit}."), true, &|frame| {
-            frame.outcome == Outcome::Wrong
-        }),
+        (
+            "False answers",
+            format!("Negatives and queries for which a wrong building was named at {limit}."),
+            true,
+            &|frame| frame.outcome == Outcome::Wrong,
+        ),
         ("Misses", "Queries whose building is not the one with the most evidence.".to_owned(), true, &|frame| {
             frame.shows.is_some() && !frame.right_at_1 && frame.outcome != Outcome::Wrong
         }),
-        ("Right, but not sure", format!("Queries whose building fits best, and which are not answered at {limit}."), false, &|frame| {
-            frame.right_at_1 && frame.outcome != Outcome::Right && frame.outcome != Outcome::Wrong
-        }),
+        (
+            "Right, but not sure",
+            format!("Queries whose building fits best, and which are not answered at {limit}."),
+            false,
+            &|frame| frame.right_at_1 && frame.outcome != Outcome::Right && frame.outcome != Outcome::Wrong,
+        ),
     ];
     for (title, what, open, belongs) in sections {
         let frames: Vec<&Judged> = evaluation.frames.iter().filter(|frame| belongs(frame)).collect();

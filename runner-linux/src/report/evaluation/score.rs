@@ -135,7 +135,8 @@ fn above(frame: &Judged, threshold: Option<f64>) -> bool {
 impl Stated {
     fn new(frames: &[Judged], place: usize, stated: f64) -> Self {
         let count = |query: bool, outcome: Outcome| {
-            let there = |frame: &&Judged| frame.shows.is_some() == query && frame.at_stated.get(place) == Some(&outcome);
+            let there =
+                |frame: &&Judged| frame.shows.is_some() == query && frame.at_stated.get(place) == Some(&outcome);
             frames.iter().filter(there).count()
         };
         let negatives = frames.iter().filter(|frame| frame.shows.is_none()).count();
@@ -231,7 +232,11 @@ pub fn recall_curve(frames: &[Judged]) -> Vec<(usize, usize)> {
     let mut curve = vec![(0, 0)];
     let (mut false_accepts, mut right) = (0, 0);
     for (_, is_right) in ranked {
-        if is_right { right += 1 } else { false_accepts += 1 }
+        if is_right {
+            right += 1
+        } else {
+            false_accepts += 1
+        }
         curve.push((false_accepts, right));
     }
     curve

@@ -56,12 +56,8 @@ fn write_stated(out: &mut String, rows: &[Stated], negatives: usize) -> std::fmt
     )?;
     for row in rows {
         let [low, high] = interval(row.false_accepts_on_negatives, negatives);
-        let accepted = format!(
-            "{} of {} ({:.1} %)",
-            row.false_accepts_on_negatives,
-            negatives,
-            100.0 * row.false_accept_rate
-        );
+        let accepted =
+            format!("{} of {} ({:.1} %)", row.false_accepts_on_negatives, negatives, 100.0 * row.false_accept_rate);
         writeln!(
             out,
             "  {:>8}  {accepted:>24}  {:>15}  {:>6}  {:>6}  {:>10}  {:>8}",
@@ -85,8 +81,7 @@ fn write_reliability(out: &mut String, bins: &[Bin]) -> std::fmt::Result {
     )?;
     for bin in bins {
         let members = bin.right + bin.wrong + bin.negatives;
-        let observed =
-            if members == 0 { "-".to_owned() } else { format!("{:.1} %", 100.0 * bin.observed_false) };
+        let observed = if members == 0 { "-".to_owned() } else { format!("{:.1} %", 100.0 * bin.observed_false) };
         writeln!(
             out,
             "  {:>18}  {:>6}  {:>6}  {:>9}  {observed:>14}  {:>19.1} %",
