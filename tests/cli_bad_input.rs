@@ -70,10 +70,9 @@ fn a_picture_that_cannot_be_read_is_refused_with_what_to_do() {
         town.write(name, &bytes[..bytes.len() / 3]);
         refused_picture(&town, name, &["is damaged", "save it again as JPEG or PNG"]);
     }
-    // What is left of a JPEG can be shown, and a part of a building be recognized; but a table stores no half.
     let bytes = encoded(&tower, ImageFormat::Jpeg);
     town.write("cut.jpg", &bytes[..bytes.len() / 3]);
-    refused_for_a_table(&town, "cut.jpg", &["is damaged", "its end is missing", "save it again as JPEG or PNG"]);
+    refused_picture(&town, "cut.jpg", &["is damaged", "its end is missing", "save it again as JPEG or PNG"]);
     town.write("header.png", &encoded(&tower, ImageFormat::Png)[..20]);
     refused_picture(&town, "header.png", &["is damaged"]);
     town.write("empty.jpg", "");

@@ -23,7 +23,7 @@ fn count(folder: &Path, ending: &str) -> usize {
 #[test]
 fn a_newcomer_is_told_a_story_and_finds_pictures() {
     let here = tempfile::tempdir().expect("a folder");
-    let output = daymark(here.path(), &["demo", "--small"]);
+    let output = daymark(here.path(), &["demo"]);
     let said = text(&output.stdout);
     assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
     for part in ["1. Enroll", "2. Recognize", "3. Tell apart", "4. Say no", "What to notice", "Now you:"] {
@@ -62,7 +62,7 @@ fn a_newcomer_is_told_a_story_and_finds_pictures() {
 fn a_place_that_cannot_be_written_is_named() {
     let here = tempfile::tempdir().expect("a folder");
     fs::write(here.path().join("taken"), "a file").expect("a file");
-    let output = daymark(here.path(), &["demo", "--small", "--out", "taken"]);
+    let output = daymark(here.path(), &["demo", "--out", "taken"]);
     assert_eq!(output.status.code(), Some(2));
     let error = text(&output.stderr);
     assert!(error.contains("taken") && error.contains("give --out"), "{error}");

@@ -318,6 +318,8 @@ fn tables_are_merged_and_landmarks_removed() {
     assert_eq!(document["duplicates"], json!(["Gate"]));
     // One of the two views of the other table is the first table's: it is not stored twice.
     assert_eq!(listed(&town, "all.daymark"), [("Gate".into(), 2), ("Hall".into(), 1), ("Mill".into(), 1)]);
+    let both = ["enroll", "--table", "all.daymark", "--name", "Gate", "gate.pgm", "gate-2.pgm"];
+    assert!(town.run(&both).succeeded().stdout.starts_with("Gate: nothing new"), "it has each of them");
     assert_eq!((town.read("town.daymark"), town.read("other.daymark")), (first, second), "the sources stay");
 
     let all = town.read("all.daymark");

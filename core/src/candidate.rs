@@ -4,7 +4,7 @@ use heapless::Vec;
 
 use crate::extract::Features;
 use crate::feature::COMMONNESS;
-use crate::kernel::{Kernels, VoteColumns};
+use crate::kernel::{Kernels, NUMBER_BITS, VoteColumns};
 use crate::model::SURPRISE;
 use crate::pyramid::scale;
 
@@ -66,7 +66,7 @@ pub struct Candidates<const CANDIDATES: usize> {
     gain: Vec<i32, CANDIDATES>,
     scale: Vec<f32, CANDIDATES>,
     stored: Vec<u16, CANDIDATES>,
-    order: Vec<u64, CANDIDATES>,
+    order: Vec<u32, CANDIDATES>,
 }
 
 impl<const CANDIDATES: usize> Candidates<CANDIDATES> {
@@ -182,16 +182,27 @@ pub struct CandidateView<'a> {
 }
 
 /// Larger is better: gain, then the lower stored number, then the lower query number.
-fn key(gain: i32, stored: u16, query: u16) -> u64 {
-    (gain as u64) << 32 | u64::from(!stored) << 16 | u64::from(!query)
+///
+/// 10 bits of gain, then the stored number in 10 bits and the query number in 11.
+fn key(gain: i32, stored: u16, query: u16) -> u32 {
+    let (stored, query) = (!u32::from(stored) & STORED_LAST, !u32::from(query) & QUERY_LAST);
+    (gain as u32) << (STORED_BITS + NUMBER_BITS) | stored << NUMBER_BITS | query
 }
 
-fn parts(key: u64) -> (i32, u16, u16) {
-    ((key >> 32) as i32, !((key >> 16) as u16), !(key as u16))
+fn parts(key: u32) -> (i32, u16, u16) {
+    let (stored, query) = (!(key >> NUMBER_BITS) & STORED_LAST, !key & QUERY_LAST);
+    ((key >> (STORED_BITS + NUMBER_BITS)) as i32, stored as u16, query as u16)
 }
+
+const STORED_BITS: u32 = 10;
+/// Stored corners have numbers up to this.
+pub(crate) const STORED_LAST: u32 = (1 << STORED_BITS) - 1;
+/// The frame's corners have numbers up to this.
+const QUERY_LAST: u32 = (1 << NUMBER_BITS) - 1;
+const _: () = assert!(((MOST_BITS * GAIN_UNIT) as u64) < 1 << (u32::BITS - STORED_BITS - NUMBER_BITS));
 
 /// A heap with the smallest key on top, which the next larger one replaces when the heap is full.
-fn keep_largest<const N: usize>(heap: &mut Vec<u64, N>, key: u64) {
+fn keep_largest<const N: usize>(heap: &mut Vec<u32, N>, key: u32) {
     if heap.push(key).is_ok() {
         let mut child = heap.len() - 1;
         while child > 0 {
@@ -211,7 +222,7 @@ fn keep_largest<const N: usize>(heap: &mut Vec<u64, N>, key: u64) {
 }
 
 /// Restores the heap below its top within the first `end` elements.
-fn sift_down(heap: &mut [u64], end: usize) {
+fn sift_down(heap: &mut [u32], end: usize) {
     let mut parent = 0;
     loop {
         let (left, right) = (2 * parent + 1, 2 * parent + 2);
@@ -229,14 +240,14 @@ fn sift_down(heap: &mut [u64], end: usize) {
 }
 
 /// Turns the heap into a list, largest first.
-fn sort_heap(heap: &mut [u64]) {
+fn sort_heap(heap: &mut [u32]) {
     for end in (1..heap.len()).rev() {
         swap_if(heap, 0, end, |_, _| true);
         sift_down(heap, end);
     }
 }
 
-fn swap_if(heap: &mut [u64], a: usize, b: usize, wanted: impl Fn(u64, u64) -> bool) -> bool {
+fn swap_if(heap: &mut [u32], a: usize, b: usize, wanted: impl Fn(u32, u32) -> bool) -> bool {
     let (Some(&at_a), Some(&at_b)) = (heap.get(a), heap.get(b)) else { return false };
     if !wanted(at_a, at_b) {
         return false;
@@ -248,4 +259,17 @@ fn swap_if(heap: &mut [u64], a: usize, b: usize, wanted: impl Fn(u64, u64) -> bo
         *slot = at_a;
     }
     true
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn more_gain_comes_first_then_the_lower_numbers() {
+        let sorted = [(768, 0, 0), (768, 0, 2_047), (768, 1, 0), (768, 1_023, 0), (767, 0, 0), (1, 1_023, 2_047)];
+        let keys = sorted.map(|(gain, stored, query)| key(gain, stored, query));
+        assert!(keys.is_sorted_by(|a, b| a > b));
+        assert_eq!(keys.map(parts), sorted);
+    }
 }

@@ -150,7 +150,7 @@ fn sum_by_cell<const QUERY: usize>(pairing: &Pairing<'_, QUERY>, corners: &[Corn
     let mut cells = [[0_i32; CELLS]; CELLS];
     for corner in corners {
         let Some(position) = pairing.stored.positions.get(usize::from(corner.stored)) else { continue };
-        let cell = |p: i32| (p.max(0) as usize * CELLS / side).min(CELLS - 1);
+        let cell = |p: i32| ((p.max(0) as usize).saturating_mul(CELLS) / side).min(CELLS - 1);
         if let Some(sum) = cells.get_mut(cell(position.y)).and_then(|row| row.get_mut(cell(position.x))) {
             *sum += corner.evidence;
         }

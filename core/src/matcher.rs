@@ -2,7 +2,7 @@
 
 use heapless::Vec;
 
-use crate::candidate::Candidates;
+use crate::candidate::{Candidates, STORED_LAST};
 use crate::evidence::{CornerEvidence, total, weigh};
 use crate::extract::Features;
 use crate::hypothesis::{Hypotheses, HypothesisSource, SignatureVotes};
@@ -48,6 +48,7 @@ impl<const STORED: usize, const CANDIDATES: usize, const BLOCKS: usize> Matcher<
     /// Working memory; nothing depends on what was matched before.
     pub const fn new() -> Self {
         const { assert!(CANDIDATES >= STORED, "every stored corner may become a pair") };
+        const { assert!(STORED <= STORED_LAST as usize + 1, "a candidate has 10 bits for a stored corner") };
         Self {
             shortlist: Shortlist::new(),
             candidates: Candidates::new(),

@@ -1,6 +1,7 @@
 //! The features of a frame, arranged for lookup by place.
 
 use crate::extract::Features;
+use crate::kernel::NUMBER_LIMIT;
 
 /// Cells across and down; a cell of a 640 x 480 frame is 40 px wide.
 const GRID: [usize; 2] = [16, 12];
@@ -25,6 +26,7 @@ pub struct QueryIndex<const FEATURES: usize> {
 impl<const FEATURES: usize> QueryIndex<FEATURES> {
     /// An index of nothing.
     pub const fn new() -> Self {
+        const { assert!(FEATURES <= NUMBER_LIMIT as usize + 1, "a candidate has 11 bits for a corner of the frame") };
         Self {
             placed: [Placed { position: [0.0; 2], number: 0, level: 0 }; FEATURES],
             starts: [0; CELLS + 1],

@@ -25,11 +25,12 @@ pub struct Calibration {
 }
 
 impl Calibration {
-    /// The calibration of a profile's views.
+    /// The calibration of a profile's views, as `cargo run --release --example calibrate` fits it to pairs of pictures
+    /// of different buildings.
     pub const fn of(profile: Profile) -> Self {
         match profile {
-            Profile::Handheld => Self { location: 1_346, scale: 523 },
-            Profile::Board => Self { location: 1_346, scale: 523 },
+            Profile::Handheld => Self { location: 1_929, scale: 684 },
+            Profile::Board => Self { location: 5_638, scale: 2_486 },
         }
     }
 

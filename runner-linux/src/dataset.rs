@@ -186,7 +186,7 @@ impl fmt::Display for DatasetError {
                 path.display()
             ),
             Self::MissingPictures(path, missing) => {
-                let shown = missing.iter().take(5).map(|picture| format!("\n  {picture}")).collect::<String>();
+                let shown = missing.iter().take(5).fold(String::new(), |list, picture| list + "\n  " + picture);
                 let more = missing.len().saturating_sub(5);
                 let rest = if more > 0 { format!("\n  and {more} more") } else { String::new() };
                 let folder = path.parent().unwrap_or(Path::new("."));

@@ -21,33 +21,41 @@ pub const FRAME_SIDE: usize = 640;
 
 /// How a profile reads frames and pictures.
 pub const fn selection(profile: Profile) -> Selection {
-    let query = FrontEnd { features: 800, cell_share_tenths: 12 };
-    match profile {
-        Profile::Board => Selection {
-            candidates: FrontEnd { features: 1_600, cell_share_tenths: 25 },
-            query,
-            keep: profile.corners_per_view(),
-        },
-        _ => Selection {
-            candidates: FrontEnd { features: 800, cell_share_tenths: 25 },
-            query,
-            keep: profile.corners_per_view(),
-        },
+    let keep = profile.corners_per_view();
+    let (candidates, query) = match profile {
+        Profile::Board => (1_600, 1_600),
+        _ => (800, 800),
+    };
+    Selection {
+        candidates: FrontEnd { features: candidates, cell_share_tenths: 25 },
+        query: FrontEnd { features: query, cell_share_tenths: 12 },
+        keep,
     }
 }
 
 /// Features of a frame, at most.
-pub const QUERY_FEATURES: usize = 800;
+pub const QUERY_FEATURES: usize = 1_600;
 const STRIP: usize = 256;
-const SLOTS: usize = selection(Profile::Handheld).query.slots();
+const SLOTS: usize = selection(Profile::Board).query.slots();
 
-type HandheldRecognizer = Recognizer<100, 200, 512, QUERY_FEATURES>;
-type BoardRecognizer = Recognizer<800, 800, 4_096, QUERY_FEATURES>;
+type HandheldRecognizer = Recognizer<100, 200, 512, 800>;
+type BoardRecognizer = Recognizer<800, 800, 2_048, QUERY_FEATURES>;
 
 #[derive(Debug)]
 enum AnyRecognizer {
     Handheld(Box<HandheldRecognizer>),
     Board(Box<BoardRecognizer>),
+}
+
+// A boxed value is made on the stack first: each in a frame of its own, so that the small one never pays for the large.
+#[inline(never)]
+fn handheld() -> AnyRecognizer {
+    AnyRecognizer::Handheld(Box::default())
+}
+
+#[inline(never)]
+fn board() -> AnyRecognizer {
+    AnyRecognizer::Board(Box::default())
 }
 
 /// Everything that recognizing frames needs, allocated once.
@@ -73,8 +81,8 @@ impl Engine {
     /// An engine with chosen kernels; the results are the same.
     pub fn with_processor(profile: Profile, processor: Processor) -> Self {
         let (recognizer, distances) = match profile {
-            Profile::Board => (AnyRecognizer::Board(Box::default()), BoardRecognizer::DISTANCE_BYTES),
-            _ => (AnyRecognizer::Handheld(Box::default()), HandheldRecognizer::DISTANCE_BYTES),
+            Profile::Board => (board(), BoardRecognizer::DISTANCE_BYTES),
+            _ => (handheld(), HandheldRecognizer::DISTANCE_BYTES),
         };
         Self {
             processor,

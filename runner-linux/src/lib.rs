@@ -1,6 +1,7 @@
 //! Everything around daymark's core that has an operating system.
 
 pub mod command;
+mod cut_jpeg;
 pub mod dataset;
 pub mod engine;
 pub mod enroll;

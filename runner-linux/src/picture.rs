@@ -5,6 +5,7 @@ use std::fs::File;
 use std::io::{BufReader, Cursor, Read};
 use std::path::{Path, PathBuf};
 
+use crate::cut_jpeg::is_cut_jpeg;
 use daymark_core::image::{FrameError, GrayView};
 use image::metadata::Orientation;
 use image::{DynamicImage, ImageDecoder, ImageError, ImageReader, Limits};
@@ -103,6 +104,9 @@ pub fn read_gray(path: &Path) -> Result<GrayImage, PictureError> {
 fn gray_from_bytes(bytes: &[u8]) -> Result<GrayImage, Reason> {
     if bytes.is_empty() {
         return Err(Reason::Empty);
+    }
+    if is_cut_jpeg(bytes) {
+        return Err(Reason::Damaged("its end is missing".to_owned()));
     }
     let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| Reason::Io(e.to_string()))?;
     if reader.format().is_none() {

@@ -32,9 +32,6 @@ pub struct Args {
     /// The folder for the pictures, the table and the page to look at; it is made if need be
     #[arg(long, value_name = "DIR", default_value = "daymark-demo")]
     out: PathBuf,
-    /// Frames of 320 x 240 pixels, as of a very small camera: quicker, and with fewer corners
-    #[arg(long)]
-    small: bool,
 }
 
 /// A picture that was enrolled.
@@ -58,7 +55,7 @@ struct Seen {
 /// # Errors
 /// A folder or file that cannot be written.
 pub fn run(args: &Args) -> Result<Outcome, CommandError> {
-    let lens = if args.small { Lens::QVGA } else { Lens::VGA };
+    let lens = Lens::VGA;
     let towers = Tower::eight();
     for folder in ["enrolled", "frames", "overlays"] {
         let folder = args.out.join(folder);

@@ -114,10 +114,14 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     let mut engine = Engine::new(table.profile());
     let mut findings = Vec::new();
     let mut summary = Summary::default();
+    let mut unreadable = None;
     for (number, path) in (1..).zip(&args.frames) {
         let overlay = args.overlay.as_deref().map(|path| numbered(path, number, args.frames.len()));
         let finding = look(args, &mut engine, table, path, overlay.as_deref())?;
         summary.enter(finding.verdict);
+        if finding.verdict == VerdictName::Unreadable {
+            unreadable = finding.reason.as_ref().map(|reason| reason.message.clone());
+        }
         if args.json {
             findings.push(finding);
         } else {
@@ -145,10 +149,10 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     match summary {
         Summary { unreadable: 0, ambiguous: 0, unknown: 0, .. } => Ok(Outcome::Done),
         Summary { unreadable: 0, .. } => Ok(Outcome::NoAnswer),
-        Summary { unreadable, .. } => {
-            let frames = phrase::count(args.frames.len(), "frame");
-            Err(format!("{unreadable} of {frames} could not be read, as told above").into())
-        }
+        Summary { unreadable: count, .. } => Err(match unreadable {
+            Some(only) if args.frames.len() == 1 => only.into(),
+            _ => format!("{count} of {} frames could not be read, as told above", args.frames.len()).into(),
+        }),
     }
 }
 
@@ -164,7 +168,10 @@ fn look(
     let frame = match read_gray(path) {
         Ok(image) => image.shrunk_to(FRAME_SIDE),
         Err(error) => {
-            writeln!(io::stderr(), "error: {error}")?;
+            // The only frame's error is the command's, which is printed at its end.
+            if args.frames.len() > 1 {
+                writeln!(io::stderr(), "error: {error}")?;
+            }
             return Ok(Finding::unreadable(&error));
         }
     };

@@ -7,7 +7,6 @@
 //! ```
 
 pub mod advice;
-mod cut_jpeg;
 pub mod lint;
 pub mod manifest;
 pub mod plan;
@@ -17,5 +16,4 @@ pub mod simulate;
 pub mod update;
 mod view;
 
-pub use cut_jpeg::is_cut_jpeg;
 pub use view::{TooFewCorners, view};

@@ -7,9 +7,9 @@ use daymark_core::profile::Profile;
 use daymark_core::table::{GeoPosition, Kind, LANDMARK_BYTES, encode_landmark};
 use rayon::prelude::*;
 
-use super::{TooFewCorners, is_cut_jpeg, position, view};
+use super::{TooFewCorners, position, view};
 use crate::engine::FRAME_SIDE;
-use crate::picture::{GrayImage, PictureError, Reason, read_gray};
+use crate::picture::{GrayImage, read_gray};
 use crate::table_file::ViewEntry;
 
 /// Failures that are told at once, at most.
@@ -96,10 +96,6 @@ pub fn read_pictures(
 
 fn read_picture(path: &Path, profile: Profile) -> Result<Picture, String> {
     let gray = read_gray(path).map_err(|error| error.to_string())?.shrunk_to(FRAME_SIDE);
-    if std::fs::read(path).is_ok_and(|bytes| is_cut_jpeg(&bytes)) {
-        let reason = Reason::Damaged("its end is missing".to_owned());
-        return Err(PictureError { path: path.to_owned(), reason }.to_string());
-    }
     let says = |error: TooFewCorners| format!("the picture {} cannot be enrolled: {error}", path.display());
     let view = view(&gray, profile).map_err(says)?;
     Ok(Picture { path: path.to_owned(), gray, view, camera: position::of_camera(path) })

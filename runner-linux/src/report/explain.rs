@@ -118,9 +118,9 @@ pub struct ViewExplanation {
     pub view_width_px: u16,
     /// Rows of the stored view.
     pub view_height_px: u16,
-    /// Evidence as it counts: what one region of the view adds is limited.
+    /// Evidence as it counts: the corners', limited for each region of the view, with how plausible the map is.
     pub evidence_bits: f64,
-    /// The sum of the corners' evidence before that limit.
+    /// The plain sum of the corners' evidence.
     pub corners_sum_bits: f64,
     /// How the view appears in the frame.
     pub map: SeenMap,

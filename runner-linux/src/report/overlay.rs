@@ -15,6 +15,8 @@ const HEAD: f32 = 92.0;
 const FOOT: f32 = 40.0;
 /// Connecting lines, at most: the strongest corners.
 const LINES: usize = 40;
+/// A smaller frame is drawn larger, with its longer side so long.
+const LEAST_SIDE: f32 = 560.0;
 /// The narrowest picture into which the caption fits.
 const LEAST_WIDTH: f32 = 640.0;
 
@@ -78,14 +80,15 @@ impl Place {
 impl Overlay<'_> {
     /// The drawing as the text of an SVG file, which needs nothing beside it.
     pub fn to_svg(&self) -> String {
-        let (width, height) = (self.frame.width as f32, self.frame.height as f32);
+        let zoom = (LEAST_SIDE / self.frame.width.max(self.frame.height).max(1) as f32).max(1.0);
+        let (width, height) = (self.frame.width as f32 * zoom, self.frame.height as f32 * zoom);
         let stored = self.best.map(|best| {
             let (w, h) = (f32::from(best.view_width_px.max(1)), f32::from(best.view_height_px.max(1)));
-            let scale = (height / h).min(width / w).min(1.5);
+            let scale = (height / h).min(width / w);
             Place { x: MARGIN, y: HEAD + (height - h * scale) / 2.0, width: w * scale, height: h * scale, scale }
         });
         let left = stored.map_or(MARGIN, |place| place.x + place.width + MARGIN);
-        let frame = Place { x: left, y: HEAD, width, height, scale: 1.0 };
+        let frame = Place { x: left, y: HEAD, width, height, scale: zoom };
         let whole = [(frame.x + width + MARGIN).max(LEAST_WIDTH), HEAD + height + FOOT];
         let mut document = Document::new()
             .set("viewBox", format!("0 0 {:.0} {:.0}", whole[0], whole[1]))
@@ -283,7 +286,7 @@ fn legend(best: &ViewExplanation, y: f32) -> Group {
     let mut legend = Group::new();
     let mut x = MARGIN + 6.0;
     for group in &best.groups {
-        let text = format!("{} {} ({:+.1} bits)", group.corners, group.said.name(), group.evidence_bits);
+        let text = format!("{} {} {:+.1}", group.corners, group.said.name(), group.evidence_bits);
         legend = legend.add(circle([x, y - 4.0], 4.5).set("fill", colour(group.said)));
         legend = legend.add(line_of_text(&text, x + 10.0, y, 12.0, PALE));
         x += 30.0 + 6.3 * text.len() as f32;

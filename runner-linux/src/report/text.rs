@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use super::explain::{Explained, ExplainedCorner, ViewExplanation};
 use super::finding::{Candidate, Finding};
-use super::phrase::{count, grouped, milliseconds, printable, probability, signed_bits};
+use super::phrase::{count, milliseconds, printable, probability, signed_bits};
 
 /// Corners that an explanation lists.
 const LISTED: usize = 12;
@@ -103,7 +103,7 @@ fn write_view(out: &mut String, view: &ViewExplanation) -> std::fmt::Result {
     let [(for_it, for_bits), (against, against_bits)] = view.for_and_against();
     writeln!(
         out,
-        "    view {}: {} for it ({}), {against} against it ({}); {:.1} bits count, because what one region adds is limited",
+        "    view {}: {} for it ({}), {against} against it ({}); all told, with how plausible the map is, {:.1} bits",
         view.view,
         count(for_it, "corner"),
         signed_bits(for_bits),
@@ -123,9 +123,9 @@ fn write_view(out: &mut String, view: &ViewExplanation) -> std::fmt::Result {
         let residual = group.median_residual_px.map_or(String::new(), |px| format!("  residual {px:.1} px (median)"));
         writeln!(
             out,
-            "      {:<13} {:>4} corners  {:>11}{residual}",
+            "      {:<10}{:>14}  {:>11}{residual}",
             group.said.name(),
-            grouped(group.corners as u64),
+            count(group.corners, "corner"),
             signed_bits(group.evidence_bits),
         )?;
     }

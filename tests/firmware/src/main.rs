@@ -20,6 +20,7 @@ mod recognize;
 mod start;
 
 use daymark_core::capacity::{HANDHELD_FRONT_END, HandheldExtractor, HandheldFeatures, HandheldMemory};
+use daymark_core::image::GrayView;
 use daymark_core::kernel::Portable;
 use daymark_core::tone::TonedFrame;
 
@@ -30,11 +31,23 @@ const WIDTH: usize = 320;
 const HEIGHT: usize = 240;
 /// What this device needs for such frames.
 const MEMORY: HandheldMemory = HandheldMemory::of_frame(WIDTH, HEIGHT);
-/// The stack, on which everything lives but the frame and the table.
+/// The stack, on which everything lives but the frame, the table and the answers; `memory.x` has the same number.
 const STACK: usize = 64 * 1_024;
-/// What the calls may take of it, beside the memory above.
-const CALLS: usize = 3 * 1_024;
-//TEMP const _: () = assert!(MEMORY.peak() + CALLS <= STACK);
+/// What is left of it for the calls, at least: the host's round measures that they need no more.
+const CALLS: usize = 2 * 1_024;
+const _: () = assert!(MEMORY.peak() + CALLS <= STACK);
+
+/// [`MEMORY`] where `check.sh` finds it: levels, extractor, features, distances, record, recognizer.
+#[used]
+#[unsafe(link_section = ".memory_table")]
+static MEMORY_TABLE: [u32; 6] = [
+    MEMORY.levels as u32,
+    MEMORY.extractor as u32,
+    MEMORY.features as u32,
+    MEMORY.distances as u32,
+    MEMORY.record as u32,
+    MEMORY.recognizer as u32,
+];
 
 /// One round: see, enroll, recognize.
 #[inline(never)]
@@ -42,6 +55,8 @@ fn run(device: &mut Device) -> Result<Outcome, Failure> {
     let mut features = HandheldFeatures::new();
     see(device, &mut features)?;
     enroll::enroll(features.view(), device.table())?;
+    #[cfg(feature = "control")]
+    assert!(features.view().len() < 300, "the control has a panic path");
     recognize::recognize(features.view(), device)
 }
 
@@ -51,8 +66,15 @@ fn see(device: &mut Device, features: &mut HandheldFeatures) -> Result<(), Failu
     let mut levels = [0; MEMORY.levels];
     let mut extractor = const { HandheldExtractor::new() };
     let (pixels, [width, height, stride]) = device.frame();
+    // A quarter of it in other memory first, as a device does that shows its frames: the way that the PC goes.
+    let quarter = GrayView::new(pixels, width / 2, height / 2, stride)?;
+    let quarter = TonedFrame::write(&Portable, quarter, &mut levels)?.view();
+    let quarter_is_empty = quarter.row(0).is_empty();
     let frame = TonedFrame::in_place(pixels, width, height, stride)?;
-    extractor.count_corners(&Portable, frame, HANDHELD_FRONT_END, &mut levels)?;
+    let counts = extractor.count_corners(&Portable, frame, HANDHELD_FRONT_END, &mut levels)?;
+    if quarter_is_empty || counts.iter().sum::<usize>() == 0 {
+        return Err(Failure::Blank);
+    }
     Ok(extractor.extract(&Portable, frame, HANDHELD_FRONT_END, &mut levels, features)?)
 }
 

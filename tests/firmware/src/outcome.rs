@@ -5,6 +5,7 @@ use daymark_core::table::{EncodeError, StreamError, TableError};
 
 /// A round in short; the answers themselves go to where the device shows them.
 #[derive(Clone, Copy)]
+#[cfg_attr(target_os = "none", expect(dead_code, reason = "the fields are for whoever looks at the memory"))]
 pub struct Outcome {
     /// The frame shows what was enrolled.
     pub known: bool,
@@ -30,6 +31,8 @@ pub enum Failure {
     Stream,
     /// Writing the table.
     Encode(EncodeError),
+    /// The frame shows nothing.
+    Blank,
     /// The flash pages are full.
     Full,
 }

@@ -37,7 +37,8 @@ fn from_place(
     // SAFETY: nothing is written to the table in this function.
     let mut table = LandmarkTable::open(unsafe { flash.in_place(length) })?.verified()?;
     let limit = FalseAnswer::ONE_PERCENT;
-    let recognition = answer.insert(recognizer.recognize(&Portable, features, &mut table, &mut distances, &mut [], limit)?);
+    let recognition =
+        answer.insert(recognizer.recognize(&Portable, features, &mut table, &mut distances, &mut [], limit)?);
     let Some(best) = recognition.best else { return Ok(0) };
     let view = table.view(best.view)?;
     let explained =
@@ -59,7 +60,8 @@ fn from_stream(
     let mut table = TableStream::open(flash.stream(length))?;
     table.verify(&mut record)?;
     let limit = FalseAnswer::ONE_PERCENT;
-    let recognition = answer.insert(recognizer.recognize(&Portable, features, &mut table, &mut distances, &mut record, limit)?);
+    let recognition =
+        answer.insert(recognizer.recognize(&Portable, features, &mut table, &mut distances, &mut record, limit)?);
     let Some(best) = recognition.best else { return Ok(0) };
     let landmark = ViewSource::landmark(&mut table, best.landmark, &mut record)?;
     Ok(landmark.name.len())

@@ -35,7 +35,8 @@ extern "C" fn main(_: c_int, _: *const *const c_char) -> c_int {
     // SAFETY: the format has two numbers and three integers.
     unsafe {
         printf(
-            c"the round: known %d, both readers agree %d, corners in the frame %d, explained %d, stack %zu bytes\n".as_ptr(),
+            c"the round: known %d, both readers agree %d, corners in the frame %d, explained %d, stack %zu bytes\n"
+                .as_ptr(),
             c_int::from(outcome.known),
             c_int::from(outcome.same),
             outcome.corners as c_int,
@@ -65,7 +66,9 @@ fn paint() -> usize {
 fn used(bottom: usize) -> usize {
     let mut untouched = 0;
     // SAFETY: painted bytes.
-    while untouched < WATCHED && unsafe { ptr::read_volatile(ptr::with_exposed_provenance::<u8>(bottom + untouched)) } == PAINT {
+    while untouched < WATCHED
+        && unsafe { ptr::read_volatile(ptr::with_exposed_provenance::<u8>(bottom + untouched)) } == PAINT
+    {
         untouched += 1;
     }
     WATCHED - untouched

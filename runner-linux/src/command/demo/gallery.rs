@@ -91,7 +91,7 @@ fn write_seen(out: &mut String, seen: &Seen) -> std::fmt::Result {
          frame in colour</a></figcaption></figure></div>",
         escape(shows),
         escape(seen.shot.remark),
-        escape(&answer(&seen.finding)),
+        escape(answer(&seen.finding).trim_start_matches("-> ")),
         escape(&seen.frame_file),
         overlay = escape(&seen.overlay_file),
     )

@@ -163,26 +163,37 @@ fn source_table(evaluation: &Evaluation) -> String {
     table(&heads, &rows.collect::<Vec<_>>())
 }
 
+/// Frames to look at.
+struct Section {
+    title: &'static str,
+    what: String,
+    open: bool,
+    belongs: fn(&Judged) -> bool,
+}
+
 fn write_pictures(out: &mut String, evaluation: &Evaluation, read: Read<'_>) -> std::fmt::Result {
     let limit = probability(evaluation.settings.max_false_answer);
-    let sections: [(&str, String, bool, &dyn Fn(&Judged) -> bool); 3] = [
-        (
-            "False answers",
-            format!("Negatives and queries for which a wrong building was named at {limit}."),
-            true,
-            &|frame| frame.outcome == Outcome::Wrong,
-        ),
-        ("Misses", "Queries whose building is not the one with the most evidence.".to_owned(), true, &|frame| {
-            frame.shows.is_some() && !frame.right_at_1 && frame.outcome != Outcome::Wrong
-        }),
-        (
-            "Right, but not sure",
-            format!("Queries whose building fits best, and which are not answered at {limit}."),
-            false,
-            &|frame| frame.right_at_1 && frame.outcome != Outcome::Right && frame.outcome != Outcome::Wrong,
-        ),
+    let sections = [
+        Section {
+            title: "False answers",
+            what: format!("Negatives and queries for which a wrong building was named at {limit}."),
+            open: true,
+            belongs: |frame| frame.outcome == Outcome::Wrong,
+        },
+        Section {
+            title: "Misses",
+            what: "Queries whose building is not the one with the most evidence.".to_owned(),
+            open: true,
+            belongs: |frame| frame.shows.is_some() && !frame.right_at_1 && frame.outcome != Outcome::Wrong,
+        },
+        Section {
+            title: "Right, but not sure",
+            what: format!("Queries whose building fits best, and which are not answered at {limit}."),
+            open: false,
+            belongs: |frame| frame.right_at_1 && matches!(frame.outcome, Outcome::Ambiguous | Outcome::Unknown),
+        },
     ];
-    for (title, what, open, belongs) in sections {
+    for Section { title, what, open, belongs } in sections {
         let frames: Vec<&Judged> = evaluation.frames.iter().filter(|frame| belongs(frame)).collect();
         writeln!(out, "<h2>{title}: {}</h2>\n<p class=\"pale\">{}</p>", frames.len(), escape(&what))?;
         if frames.is_empty() {

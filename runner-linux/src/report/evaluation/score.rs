@@ -210,10 +210,10 @@ fn sources(frames: &[Judged], threshold: Option<f64>) -> Vec<Source> {
 
 /// The 95 % interval of a share of which `part` of `whole` was observed (Wilson 1927); from 0 to 1 of nothing.
 pub fn interval(part: usize, whole: usize) -> [f64; 2] {
+    const Z: f64 = 1.96;
     if whole == 0 {
         return [0.0, 1.0];
     }
-    const Z: f64 = 1.96;
     let (n, p) = (whole as f64, share(part, whole));
     let centre = p + Z * Z / (2.0 * n);
     let reach = Z * libm::sqrt(p * (1.0 - p) / n + Z * Z / (4.0 * n * n));
@@ -232,11 +232,7 @@ pub fn recall_curve(frames: &[Judged]) -> Vec<(usize, usize)> {
     let mut curve = vec![(0, 0)];
     let (mut false_accepts, mut right) = (0, 0);
     for (_, is_right) in ranked {
-        if is_right {
-            right += 1
-        } else {
-            false_accepts += 1
-        }
+        *(if is_right { &mut right } else { &mut false_accepts }) += 1;
         curve.push((false_accepts, right));
     }
     curve
