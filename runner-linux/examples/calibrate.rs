@@ -102,7 +102,11 @@ fn main() -> Result<(), Box<dyn Error + Send + Sync>> {
     let location = quantile + scale * libm::log(1.0 - QUANTILE);
     let unit = f64::from(EVIDENCE_UNIT);
     println!("profile {}: {} wrong pairs, {} above the quantile", profile.name(), wrong.len(), above.len());
-    println!("location {location:.0}, scale {scale:.0} in 1/{EVIDENCE_UNIT}: {:.2} and {:.2}", location / unit, scale / unit);
+    println!(
+        "location {location:.0}, scale {scale:.0} in 1/{EVIDENCE_UNIT}: {:.2} and {:.2}",
+        location / unit,
+        scale / unit
+    );
     println!("the highest: {:?}", above.iter().rev().take(12).map(|e| e / EVIDENCE_UNIT).collect::<Vec<_>>());
     Ok(())
 }

@@ -7,7 +7,7 @@ const EOI: u8 = 0xD9;
 
 /// True for a JPEG file without the marker that ends its picture (ITU-T T.81, annex B). What follows the picture, and
 /// a thumbnail in a segment before it, do not matter. False for files of other kinds.
-pub fn is_cut_jpeg(bytes: &[u8]) -> bool {
+pub(crate) fn is_cut_jpeg(bytes: &[u8]) -> bool {
     let Some(mut rest) = bytes.strip_prefix(&[0xFF, SOI]) else { return false };
     loop {
         // To the next marker: over entropy-coded data with its stuffed zeros, restart markers, and fill bytes.

@@ -1,11 +1,18 @@
-//! Everything around daymark's core that has an operating system.
+//! Everything around daymark's core that has an operating system: files, threads, vector instructions, reports and the
+//! command line.
+//!
+//! ```text
+//!  picture ─── enroll ─────── table_file        pictures become views of a table
+//!  picture ─── engine ─────── report            frames become answers, and answers text, JSON and drawings
+//!  dataset ─── command::evaluate                how often that is right
+//! ```
 
-pub mod command;
+pub mod picture;
 mod cut_jpeg;
-pub mod dataset;
+pub mod simd;
 pub mod engine;
 pub mod enroll;
-pub mod picture;
-pub mod report;
-pub mod simd;
 pub mod table_file;
+pub mod dataset;
+pub mod report;
+pub mod command;

@@ -15,6 +15,7 @@ use daymark_fixtures::{Lens, Tower, View};
 use image::ExtendedColorType::Rgb8;
 use rayon::prelude::*;
 
+use super::evaluate::measure::workers;
 use super::{CommandError, Outcome};
 use crate::engine::{Engine, FRAME_SIDE};
 use crate::enroll;
@@ -63,15 +64,18 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     }
     say("daymark: eight buildings that this program draws itself. No camera, no network, nothing downloaded.\n")?;
 
+    let workers = workers(0)?;
     let begin = Instant::now();
-    let enrolled = enroll_towers(&args.out, &towers, lens)?;
+    let enrolled = workers.install(|| enroll_towers(&args.out, &towers, lens))?;
     let table_file = args.out.join("town.daymark");
     save_table(&table_file, &towers, &enrolled)?;
     let bytes = read_table(&table_file)?;
     let table = open_table(&table_file, &bytes)?;
     tell_enrollment(&towers, &table_file, &table, bytes.len(), begin.elapsed())?;
 
-    let seen = recognize_all(&args.out, table, &enrolled, scene::shots(&towers, lens), lens)?;
+    let shots = scene::shots(&towers, lens);
+    workers.install(|| draw_frames(&args.out, &shots, lens))?;
+    let seen = recognize_all(&args.out, table, &enrolled, shots)?;
     tell_lesson(&seen, Lesson::Known, "2. Recognize: frames that differ from everything that was enrolled.")?;
     tell_lesson(
         &seen,
@@ -129,21 +133,25 @@ fn save_table(path: &Path, towers: &[Tower; 8], enrolled: &[Enrolled]) -> Result
     Ok(())
 }
 
+fn frame_file(shot: &Shot) -> String {
+    format!("frames/{}.png", shot.name)
+}
+
+fn draw_frames(out: &Path, shots: &[Shot], lens: Lens) -> Result<(), CommandError> {
+    let draw = |shot: &Shot| write_png(&out.join(frame_file(shot)), &scene::render(shot, lens), lens);
+    shots.par_iter().try_for_each(draw)
+}
+
 fn recognize_all(
     out: &Path,
     mut table: LandmarkTable<'_>,
     enrolled: &[Enrolled],
     shots: Vec<Shot>,
-    lens: Lens,
 ) -> Result<Vec<Seen>, CommandError> {
-    let files: Vec<String> = shots.iter().map(|shot| format!("frames/{}.png", shot.name)).collect();
-    shots
-        .par_iter()
-        .zip(&files)
-        .try_for_each(|(shot, file)| write_png(&out.join(file), &scene::render(shot, lens), lens))?;
     let mut engine = Engine::new(table.profile());
     let mut seen = Vec::new();
-    for (shot, frame_file) in shots.into_iter().zip(files) {
+    for shot in shots {
+        let frame_file = frame_file(&shot);
         let begin = Instant::now();
         let path = out.join(&frame_file);
         let frame = read_gray(&path)?.shrunk_to(FRAME_SIDE);

@@ -1,6 +1,6 @@
 //! `daymark evaluate`: how good the answers are on a folder of pictures whose truth is known.
 
-mod measure;
+pub(super) mod measure;
 
 use std::io::{self, Write};
 use std::path::PathBuf;
@@ -61,7 +61,7 @@ fn profile(text: &str) -> Result<Profile, String> {
 /// A manifest or picture that cannot be read; a page that cannot be written.
 pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     let dataset = Dataset::open(&args.dataset)?;
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(usize::from(args.jobs)).build()?;
+    let pool = measure::workers(usize::from(args.jobs))?;
     let evaluation = pool.install(|| evaluate(args, &dataset))?;
     if let Some(path) = &args.html {
         let page = html::page(&evaluation, &|file| measure::read(&dataset.folder, file).ok());

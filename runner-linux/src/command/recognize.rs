@@ -14,7 +14,7 @@ use crate::picture::{GrayImage, read_gray};
 use crate::report::explain::{Explained, ViewExplanation};
 use crate::report::finding::{Finding, Times, VerdictName};
 use crate::report::overlay::Overlay;
-use crate::report::{phrase, text};
+use crate::report::text;
 use crate::table_file::{open_table, read_table};
 
 /// Version of the form of `--json`.

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use super::{TooFewCorners, position, view};
 use crate::engine::FRAME_SIDE;
-use crate::picture::{GrayImage, read_gray};
+use crate::picture::{GrayImage, PictureError, Reason, read_gray};
 use crate::table_file::ViewEntry;
 
 /// Failures that are told at once, at most.

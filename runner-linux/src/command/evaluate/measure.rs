@@ -9,6 +9,7 @@ use daymark_core::table::{Kind, LandmarkTable, TableError};
 use daymark_core::verdict::{Answer, FalseAnswer, NoAnswer, Recognition, Verdict};
 use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
+use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 
 use super::super::CommandError;
 use crate::dataset::Dataset;
@@ -44,6 +45,16 @@ struct Task<'a> {
     file: &'a str,
     shows: Option<&'a str>,
     source: &'a str,
+}
+
+/// Threads to enroll and recognize on; 0 for as many as there are processors.
+///
+/// # Errors
+/// The system has no thread to give.
+pub(in super::super) fn workers(count: usize) -> Result<ThreadPool, ThreadPoolBuildError> {
+    /// What an engine and an extractor may pass through on their way to the heap; only what is touched costs memory.
+    const STACK_BYTES: usize = 32 << 20;
+    ThreadPoolBuilder::new().num_threads(count).stack_size(STACK_BYTES).build()
 }
 
 /// Reads a picture as it is enrolled and recognized.
