@@ -222,12 +222,12 @@ impl<const SLOTS: usize> Spread<SLOTS> {
     }
 
     fn start_row(&mut self, row: usize) {
-        self.cell_row = (row * self.per_row >> 16).min(CELLS_Y - 1) * CELLS_X;
+        self.cell_row = ((row * self.per_row) >> 16).min(CELLS_Y - 1) * CELLS_X;
     }
 
     #[inline]
     fn cell(&self, column: usize) -> usize {
-        self.cell_row + (column * self.per_column >> 16).min(CELLS_X - 1)
+        self.cell_row + ((column * self.per_column) >> 16).min(CELLS_X - 1)
     }
 
     /// Whether a peak of this response is certain to be dropped.
@@ -274,9 +274,9 @@ impl<const SLOTS: usize> Spread<SLOTS> {
         let first = |cell: &'_ [Peak]| cell.len().min(share);
         let in_first: usize = cells().map(first).sum();
         // Of the first pass the strongest `count`; or all, and of the rest the strongest that fill up.
-        let strongest_first = threshold(cells().map(|cell| cell.get(..first(cell)).unwrap_or(&[])), count);
+        let strongest_first = threshold(&cells().map(|cell| cell.get(..first(cell)).unwrap_or(&[])), count);
         let fill = count.saturating_sub(in_first);
-        let strongest_rest = threshold(cells().map(|cell| cell.get(first(cell)..).unwrap_or(&[])), fill);
+        let strongest_rest = threshold(&cells().map(|cell| cell.get(first(cell)..).unwrap_or(&[])), fill);
         for cell in cells() {
             let split = first(cell);
             for (rank, &peak) in cell.iter().enumerate() {
@@ -290,7 +290,7 @@ impl<const SLOTS: usize> Spread<SLOTS> {
 
 /// The largest bound that at least `count` peaks reach, by bisection; the lists are sorted, strongest first. With
 /// fewer peaks every one reaches it; with `count = 0` none does.
-fn threshold<'a>(lists: impl Iterator<Item = &'a [Peak]> + Clone, count: usize) -> Peak {
+fn threshold<'a>(lists: &(impl Iterator<Item = &'a [Peak]> + Clone), count: usize) -> Peak {
     if count == 0 {
         return Peak(u64::MAX);
     }

@@ -187,17 +187,19 @@ fn binomial([p0, p1, p2, p3, p4]: [i32; 5]) -> i32 {
 #[inline(always)]
 pub fn response_row(rows: [[&[i32]; 3]; 5], out: &mut [f32]) {
     let [[xx0, yy0, xy0], [xx1, yy1, xy1], [xx2, yy2, xy2], [xx3, yy3, xy3], [xx4, yy4, xy4]] = rows;
-    let xx = xx0.iter().zip(xx1).zip(xx2).zip(xx3).zip(xx4);
-    let yy = yy0.iter().zip(yy1).zip(yy2).zip(yy3).zip(yy4);
-    let xy = xy0.iter().zip(xy1).zip(xy2).zip(xy3).zip(xy4);
-    for (((xx, yy), xy), out) in xx.zip(yy).zip(xy).zip(out) {
-        let smoothed = |((((p0, p1), p2), p3), p4): ((((&i32, &i32), &i32), &i32), &i32)| {
-            binomial([*p0, *p1, *p2, *p3, *p4]) as f32
-        };
-        let (a, b, c) = (smoothed(xx), smoothed(yy), smoothed(xy));
+    let xx = smoothed_columns([xx0, xx1, xx2, xx3, xx4]);
+    let yy = smoothed_columns([yy0, yy1, yy2, yy3, yy4]);
+    let xy = smoothed_columns([xy0, xy1, xy2, xy3, xy4]);
+    for (((a, b), c), out) in xx.zip(yy).zip(xy).zip(out) {
         let trace = a + b;
         *out = 20.0 * (a * b - c * c) - trace * trace;
     }
+}
+
+#[inline(always)]
+fn smoothed_columns([r0, r1, r2, r3, r4]: [&[i32]; 5]) -> impl Iterator<Item = f32> {
+    let columns = r0.iter().zip(r1).zip(r2).zip(r3).zip(r4);
+    columns.map(|((((p0, p1), p2), p3), p4)| binomial([*p0, *p1, *p2, *p3, *p4]) as f32)
 }
 
 /// Marks possible peaks of the middle row with 1: positive, above the left and upper neighbour, not below the right
@@ -423,11 +425,11 @@ pub const NUMBER_LIMIT: i32 = (1 << NUMBER_BITS) - 1;
 pub fn closest(blocks: &[LookAlikes], search: Search) -> i32 {
     let mut best = [0; LANES];
     for block in blocks {
-        for lane in 0..LANES {
+        for (lane, best) in best.iter_mut().enumerate() {
             let [dx, dy] = [block.x[lane] - search.at[0], block.y[lane] - search.at[1]];
             let (gain, level, number) = (block.gain[lane], block.level[lane], block.number[lane]);
             let key = search_key(search, dx * dx + dy * dy, gain, level, number);
-            best[lane] = if key > best[lane] { key } else { best[lane] };
+            *best = if key > *best { key } else { *best };
         }
     }
     best.into_iter().fold(0, |best, key| if key > best { key } else { best })
@@ -492,7 +494,7 @@ pub fn votes(seed: Seed, columns: VoteColumns<'_>, agrees: &mut [u8]) -> i32 {
         let cross = 2.0 * SLACK * SLACK_PER_PIXEL;
         let near = (excess < 0.0) | (excess * excess < (cross * cross) * e);
         let turn = step[i] - seed.step;
-        let agree = near & (turn >= -1.0) & (turn <= 1.0);
+        let agree = near & (turn.abs() <= 1.0);
         agrees[i] = u8::from(agree);
         sum += if agree { gain[i] } else { 0 };
     }

@@ -41,7 +41,7 @@ pub struct Matcher<const STORED: usize, const CANDIDATES: usize, const BLOCKS: u
     votes: SignatureVotes<CANDIDATES>,
     pairs: Vec<WeightedPair, CANDIDATES>,
     corners: Vec<CornerEvidence, STORED>,
-    best_corners: Vec<CornerEvidence, STORED>,
+    latest_corners: Vec<CornerEvidence, STORED>,
 }
 
 impl<const STORED: usize, const CANDIDATES: usize, const BLOCKS: usize> Matcher<STORED, CANDIDATES, BLOCKS> {
@@ -55,7 +55,7 @@ impl<const STORED: usize, const CANDIDATES: usize, const BLOCKS: usize> Matcher<
             votes: SignatureVotes::new(),
             pairs: Vec::new(),
             corners: Vec::new(),
-            best_corners: Vec::new(),
+            latest_corners: Vec::new(),
         }
     }
 
@@ -71,7 +71,7 @@ impl<const STORED: usize, const CANDIDATES: usize, const BLOCKS: usize> Matcher<
         index: &QueryIndex<QUERY>,
         distances: &mut [u8],
     ) -> Option<ViewMatch> {
-        self.best_corners.clear();
+        self.latest_corners.clear();
         for (row, &signature) in distances.chunks_exact_mut(query.len().max(1)).zip(stored.signatures) {
             kernels.distances(signature, query.signatures, row);
         }
@@ -97,15 +97,15 @@ impl<const STORED: usize, const CANDIDATES: usize, const BLOCKS: usize> Matcher<
                 let support = hypothesis.support;
                 best =
                     Some(ViewMatch { evidence, corner_evidence, support, shape, frame_from_view, supporting_corners });
-                core::mem::swap(&mut self.corners, &mut self.best_corners);
+                core::mem::swap(&mut self.corners, &mut self.latest_corners);
             }
         }
         best
     }
 
     /// The corners behind the latest match, for an explanation.
-    pub fn corners(&self) -> &[CornerEvidence] {
-        &self.best_corners
+    pub fn latest_corners(&self) -> &[CornerEvidence] {
+        &self.latest_corners
     }
 }
 

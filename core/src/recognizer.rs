@@ -70,7 +70,7 @@ impl<const STORED: usize, const CANDIDATES: usize, const BLOCKS: usize, const QU
     ) -> Option<(ViewMatch, &[CornerEvidence])> {
         self.index.arrange(frame);
         let matched = self.compare(kernels, frame, view, distances)?;
-        Some((matched, self.matcher.corners()))
+        Some((matched, self.matcher.latest_corners()))
     }
 
     fn compare<K: Kernels>(

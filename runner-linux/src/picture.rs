@@ -38,6 +38,7 @@ impl GrayImage {
     }
 
     /// Shrinks by exact area averages so that the longer side is `side`; a smaller image stays as it is.
+    #[must_use]
     pub fn shrunk_to(self, side: usize) -> Self {
         let longer = self.width.max(self.height);
         if longer <= side {

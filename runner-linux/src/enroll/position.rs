@@ -150,7 +150,9 @@ mod tests {
         ];
         fields.extend(receiver.map(|m| field(Tag::GPSHPositioningError, Value::Rational(vec![rational(m)]))));
         let mut writer = Writer::new();
-        fields.iter().for_each(|field| writer.push_field(field));
+        for field in &fields {
+            writer.push_field(field);
+        }
         let mut bytes = Cursor::new(Vec::new());
         writer.write(&mut bytes, false).expect("written");
         from_exif(&exif::Reader::new().read_raw(bytes.into_inner()).expect("read"))

@@ -125,19 +125,20 @@ fn blur(image: &mut GrayImage, sigma: f64) {
     }
 }
 
-/// Nearly normal noise: the sum of the eight bytes of a SplitMix64 number (Steele et al. 2014), scaled.
+/// Nearly normal noise: the sum of the eight bytes of a `SplitMix64` number (Steele et al. 2014), scaled.
 struct Noise(u64);
 
 impl Noise {
+    /// The next value, in gray levels.
     fn next(&mut self) -> i32 {
+        /// The sum has mean 8 * 127.5 and standard deviation sqrt(8 * (256^2 - 1) / 12) = 209.02.
+        const SCALE: i32 = (NOISE / 209.02 * 65_536.0) as i32;
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
         z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
         z ^= z >> 31;
-        // The sum has mean 8 * 127.5 and standard deviation sqrt(8 * (256^2 - 1) / 12) = 209.02.
         let sum: i32 = z.to_le_bytes().iter().map(|&byte| i32::from(byte)).sum();
-        const SCALE: i32 = (NOISE / 209.02 * 65_536.0) as i32;
         ((sum - 1_020) * SCALE + 32_768) >> 16
     }
 }
