@@ -19,8 +19,7 @@ use daymark_fixtures::{Lens, Tower, Trial, View};
 
 /// Kernel sets to compare with the portable one.
 fn others() -> Vec<(&'static str, Box<dyn Kernels>)> {
-    let boxed =
-        |processor: Processor| -> Box<dyn Kernels> { with_kernels!(processor, kernels => Box::new(*kernels)) };
+    let boxed = |processor: Processor| -> Box<dyn Kernels> { with_kernels!(processor, kernels => Box::new(*kernels)) };
     Processor::available().into_iter().map(|processor| (processor.name(), boxed(processor))).collect()
 }
 

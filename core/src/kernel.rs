@@ -157,25 +157,36 @@ const fn least(a: u8, b: u8) -> u8 {
 pub fn structure_row(rows: [&[u8]; 3], products: [&mut [i32]; 3], out: [&mut [i32]; 3]) {
     let [above, centre, below] = rows;
     let [xx, yy, xy] = products;
-    let windows = above.windows(3).zip(centre.windows(3)).zip(below.windows(3));
-    for ((((above, centre), below), (xx, yy)), xy) in windows.zip(xx.iter_mut().zip(yy.iter_mut())).zip(xy.iter_mut()) {
-        let (&[a0, a1, a2], &[c0, _, c2], &[b0, b1, b2]) = (above, centre, below) else { return };
-        let [a0, a1, a2, c0, c2, b0, b1, b2] = [a0, a1, a2, c0, c2, b0, b1, b2].map(i16::from);
-        let gx = i32::from(2 * (c2 - c0) + (a2 - a0) + (b2 - b0));
-        let gy = i32::from(2 * (b1 - a1) + (b0 - a0) + (b2 - a2));
+    let edges = from(above, 0).zip(from(above, 2)).zip(from(below, 0)).zip(from(below, 2));
+    let cross = from(centre, 0).zip(from(centre, 2)).zip(from(above, 1)).zip(from(below, 1));
+    let gradients = edges.zip(cross).map(|((((a0, a2), b0), b2), (((c0, c2), a1), b1))| {
+        let [a0, a1, a2, c0, c2, b0, b1, b2] = [a0, a1, a2, c0, c2, b0, b1, b2].map(|&pixel| i16::from(pixel));
+        [2 * (c2 - c0) + (a2 - a0) + (b2 - b0), 2 * (b1 - a1) + (b0 - a0) + (b2 - a2)]
+    });
+    let products = xx.iter_mut().zip(yy.iter_mut()).zip(xy.iter_mut());
+    for (((xx, yy), xy), [gx, gy]) in products.zip(gradients) {
+        let (gx, gy) = (i32::from(gx), i32::from(gy));
         (*xx, *yy, *xy) = (gx * gx, gy * gy, gx * gy);
     }
     for (products, out) in [xx, yy, xy].into_iter().zip(out) {
-        for (window, out) in products.windows(5).zip(out) {
-            let &[p0, p1, p2, p3, p4] = window else { return };
-            *out = binomial([p0, p1, p2, p3, p4]);
+        let outer = from(products, 0).zip(from(products, 4));
+        let inner = from(products, 1).zip(from(products, 2)).zip(from(products, 3));
+        for (((p0, p4), ((p1, p2), p3)), out) in outer.zip(inner).zip(out) {
+            *out = binomial([*p0, *p1, *p2, *p3, *p4]);
         }
     }
 }
 
+/// The elements from `start` on.
+#[inline(always)]
+fn from<T>(row: &[T], start: usize) -> core::slice::Iter<'_, T> {
+    row.get(start..).unwrap_or(&[]).iter()
+}
+
+/// 1-4-6-4-1 with `>> 4`.
 #[inline(always)]
 fn binomial([p0, p1, p2, p3, p4]: [i32; 5]) -> i32 {
-    (p0 + p4 + 4 * (p1 + p3) + 6 * p2) >> 4
+    (p0 + p4 + 4 * (p1 + p2 + p3) + 2 * p2) >> 4
 }
 
 /// One row of the Harris response from five rows of the tensor: binomial 1-4-6-4-1 with `>> 4` down the columns gives
