@@ -32,7 +32,7 @@ fn make_folder() -> TempDir {
     };
     let view = |view: View| {
         let path = write("enrolled.pgm", view.render());
-        let image = read_gray(&path).expect("a picture").shrunk_to(FRAME_SIDE);
+        let image = read_gray(&path).expect("a picture").scaled_to(FRAME_SIDE);
         enroll::view(&image, Profile::Handheld).expect("enough corners")
     };
     let towers = Tower::eight();

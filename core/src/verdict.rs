@@ -29,8 +29,8 @@ impl Calibration {
     /// of different buildings.
     pub const fn of(profile: Profile) -> Self {
         match profile {
-            Profile::Handheld => Self { location: 1_929, scale: 684 },
-            Profile::Board => Self { location: 5_638, scale: 2_486 },
+            Profile::Handheld => Self { location: 2_258, scale: 536 },
+            Profile::Board => Self { location: 5_959, scale: 2_096 },
         }
     }
 

@@ -48,7 +48,7 @@ fn main() -> Result<(), Box<dyn Error + Send + Sync>> {
     let profile = Profile::ALL.into_iter().find(|profile| profile.name() == args.profile);
     let profile = profile.ok_or("--profile must be handheld or board")?;
     let dataset = Dataset::open(&args.dataset)?;
-    let read = |path: &Path| read_gray(path).map(|picture| picture.shrunk_to(FRAME_SIDE));
+    let read = |path: &Path| read_gray(path).map(|picture| picture.scaled_to(FRAME_SIDE));
 
     let mut frames: Vec<(Option<String>, GrayImage)> = Vec::new();
     for building in &dataset.buildings {

@@ -16,7 +16,12 @@ use crate::picture::GrayImage;
 use crate::simd::Processor;
 use crate::with_kernels;
 
-/// Longer side to which pictures and frames are shrunk, in pixels.
+/// Stack of a thread that makes engines and extractors: they pass through it on their way to the heap. Only what is
+/// touched costs memory.
+pub const STACK_BYTES: usize = 32 << 20;
+
+/// Longer side to which pictures and frames are scaled, in pixels: the calibration of false answers holds for this size
+/// with the profile's number of corners.
 pub const FRAME_SIDE: usize = 640;
 
 /// How a profile reads frames and pictures.

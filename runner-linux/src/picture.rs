@@ -37,17 +37,38 @@ impl GrayImage {
         GrayView::new(&self.pixels, self.width, self.height, self.width)
     }
 
-    /// Shrinks by exact area averages so that the longer side is `side`; a smaller image stays as it is.
+    /// Scales so that the longer side is `side`: down by exact area averages, up between pixel centres.
     #[must_use]
-    pub fn shrunk_to(self, side: usize) -> Self {
+    pub fn scaled_to(self, side: usize) -> Self {
         let longer = self.width.max(self.height);
-        if longer <= side {
+        if longer == side {
             return self;
         }
         let scaled = |length: usize| ((length * side * 2 + longer) / (2 * longer)).max(1);
         let (width, height) = (scaled(self.width), scaled(self.height));
-        area_average(&self, width, height)
+        if longer > side { area_average(&self, width, height) } else { interpolated(&self, width, height) }
     }
+}
+
+/// Bilinear enlargement; pixel areas align, the border repeats outwards. Positions in Q16, weights in Q8.
+fn interpolated(image: &GrayImage, width: usize, height: usize) -> GrayImage {
+    let place = |at: usize, from: usize, to: usize| {
+        let q16 = ((((2 * at + 1) * from) << 16) / (2 * to)).saturating_sub(1 << 15);
+        let first = (q16 >> 16).min(from - 1);
+        (first, (first + 1).min(from - 1), (q16 >> 8 & 255) as u32)
+    };
+    let columns: Vec<_> = (0..width).map(|x| place(x, image.width, width)).collect();
+    let mut pixels = Vec::with_capacity(width * height);
+    for y in 0..height {
+        let (upper, lower, fy) = place(y, image.height, height);
+        let row = |y: usize| &image.pixels[y * image.width..(y + 1) * image.width];
+        let (upper, lower) = (row(upper), row(lower));
+        pixels.extend(columns.iter().map(|&(left, right, fx)| {
+            let along = |row: &[u8]| u32::from(row[left]) * (256 - fx) + u32::from(row[right]) * fx;
+            ((along(upper) * (256 - fy) + along(lower) * fy + 32_768) >> 16) as u8
+        }));
+    }
+    GrayImage { pixels, width, height }
 }
 
 /// The weights of a box average along one axis: for each output the first input and the weights from there, of which
@@ -240,6 +261,14 @@ mod tests {
         // One output column covers 1.5 inputs: (0 + 45) / 1.5 = 30 in the upper row.
         assert_eq!(area_average(&image, 2, 2).pixels, [30, 50, 40, 190]);
         assert_eq!(area_average(&image, 1, 1).pixels, [78]);
-        assert_eq!(image.clone().shrunk_to(3), image);
+        assert_eq!(image.clone().scaled_to(3), image);
+    }
+
+    #[test]
+    fn enlargement_interpolates_between_pixel_centres() {
+        let image = GrayImage { pixels: vec![0, 100], width: 2, height: 1 };
+        let enlarged = image.scaled_to(4);
+        assert_eq!((enlarged.width, enlarged.height), (4, 2));
+        assert_eq!(enlarged.pixels, [0, 25, 75, 100, 0, 25, 75, 100]);
     }
 }

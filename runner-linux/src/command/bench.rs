@@ -130,7 +130,7 @@ struct CornerFacts {
 /// A picture or table that cannot be read, or a table without views.
 pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     let image = match &args.image {
-        Some(path) => read_gray(path)?.shrunk_to(FRAME_SIDE),
+        Some(path) => read_gray(path)?.scaled_to(FRAME_SIDE),
         None => drawn(&View::trial(&Tower::eight()[0], Trial::Between, Lens::VGA)),
     };
     let bytes = match &args.table {

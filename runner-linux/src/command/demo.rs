@@ -114,7 +114,7 @@ fn enroll_towers(out: &Path, towers: &[Tower; 8], lens: Lens) -> Result<Vec<Enro
         let file = format!("enrolled/{}.png", view.name);
         let path = out.join(&file);
         write_png(&path, &view.render().rgb, lens)?;
-        let picture = read_gray(&path)?.shrunk_to(FRAME_SIDE);
+        let picture = read_gray(&path)?.scaled_to(FRAME_SIDE);
         let view = enroll::view(&picture, Profile::Handheld)?;
         Ok(Enrolled { building: tower.name.clone(), file, picture, view })
     };
@@ -154,7 +154,7 @@ fn recognize_all(
         let frame_file = frame_file(&shot);
         let begin = Instant::now();
         let path = out.join(&frame_file);
-        let frame = read_gray(&path)?.shrunk_to(FRAME_SIDE);
+        let frame = read_gray(&path)?.scaled_to(FRAME_SIDE);
         let read = Instant::now();
         engine.extract(&frame)?;
         let extracted = Instant::now();

@@ -12,7 +12,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
 
 use super::{CommandError, Outcome};
-use crate::engine::Engine;
+use crate::engine::{Engine, STACK_BYTES};
 use crate::enroll::lint::{LintError, ViewLint, lint};
 use crate::enroll::manifest;
 use crate::enroll::plan::{Plan, check_name, read_pictures};
@@ -89,7 +89,7 @@ fn profile_named(name: &str) -> Profile {
 pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     let plans = plans(args)?;
     let (mut table, id_before) = open(&args.table, args.profile)?;
-    let mut pool = rayon::ThreadPoolBuilder::new();
+    let mut pool = rayon::ThreadPoolBuilder::new().stack_size(STACK_BYTES);
     if let Some(jobs) = args.jobs {
         pool = pool.num_threads(usize::from(jobs));
     }

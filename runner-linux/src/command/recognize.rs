@@ -166,7 +166,7 @@ fn look(
 ) -> Result<Finding, CommandError> {
     let begin = Instant::now();
     let frame = match read_gray(path) {
-        Ok(image) => image.shrunk_to(FRAME_SIDE),
+        Ok(image) => image.scaled_to(FRAME_SIDE),
         Err(error) => {
             // The only frame's error is the command's, which is printed at its end.
             if args.frames.len() > 1 {

@@ -95,7 +95,7 @@ pub fn read_pictures(
 }
 
 fn read_picture(path: &Path, profile: Profile) -> Result<Picture, String> {
-    let gray = read_gray(path).map_err(|error| error.to_string())?.shrunk_to(FRAME_SIDE);
+    let gray = read_gray(path).map_err(|error| error.to_string())?.scaled_to(FRAME_SIDE);
     let says = |error: TooFewCorners| format!("the picture {} cannot be enrolled: {error}", path.display());
     let view = view(&gray, profile).map_err(says)?;
     Ok(Picture { path: path.to_owned(), gray, view, camera: position::of_camera(path) })

@@ -13,7 +13,7 @@ use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 
 use super::super::CommandError;
 use crate::dataset::Dataset;
-use crate::engine::{Engine, FRAME_SIDE};
+use crate::engine::{Engine, FRAME_SIDE, STACK_BYTES};
 use crate::enroll;
 use crate::picture::{GrayImage, read_gray};
 use crate::report::evaluation::{GalleryView, Guess, Judged, Outcome, Times, percentile};
@@ -52,8 +52,6 @@ struct Task<'a> {
 /// # Errors
 /// The system has no thread to give.
 pub(in super::super) fn workers(count: usize) -> Result<ThreadPool, ThreadPoolBuildError> {
-    /// What an engine and an extractor may pass through on their way to the heap; only what is touched costs memory.
-    const STACK_BYTES: usize = 32 << 20;
     ThreadPoolBuilder::new().num_threads(count).stack_size(STACK_BYTES).build()
 }
 
@@ -62,7 +60,7 @@ pub(in super::super) fn workers(count: usize) -> Result<ThreadPool, ThreadPoolBu
 /// # Errors
 /// A picture that cannot be read.
 pub(super) fn read(folder: &Path, file: &str) -> Result<GrayImage, CommandError> {
-    Ok(read_gray(&folder.join(file))?.shrunk_to(FRAME_SIDE))
+    Ok(read_gray(&folder.join(file))?.scaled_to(FRAME_SIDE))
 }
 
 /// A bar on standard error, if that is a terminal.

@@ -245,13 +245,13 @@ fn write_figure(out: &mut String, picture: &str, caption: &str) -> std::fmt::Res
 }
 
 fn plain(picture: GrayImage) -> String {
-    format!("<img loading=\"lazy\" alt=\"\" src=\"{}\">", data_uri::jpeg(&picture.shrunk_to(SIDE)))
+    format!("<img loading=\"lazy\" alt=\"\" src=\"{}\">", data_uri::jpeg(&picture.scaled_to(SIDE)))
 }
 
 /// The frame with the outline of the view that was found in it.
 fn with_outline(picture: &GrayImage, best: Option<(&Guess, &GrayImage)>) -> String {
     let (width, height) = (picture.width, picture.height);
-    let small = picture.clone().shrunk_to(SIDE);
+    let small = picture.clone().scaled_to(SIDE);
     let image = Image::new().set("width", width).set("height", height).set("href", data_uri::jpeg(&small));
     let mut document = Document::new().set("viewBox", format!("0 0 {width} {height}")).add(image);
     if let Some((guess, stored)) = best {
