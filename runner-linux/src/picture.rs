@@ -2,7 +2,7 @@
 
 use std::fmt;
 use std::fs::File;
-use std::io::{BufReader, Cursor, Read};
+use std::io::{BufRead, BufReader, Cursor, Read, Seek};
 use std::path::{Path, PathBuf};
 
 use crate::cut_jpeg::is_cut_jpeg;
@@ -114,23 +114,28 @@ fn area_average(image: &GrayImage, width: usize, height: usize) -> GrayImage {
 pub fn read_gray(path: &Path) -> Result<GrayImage, PictureError> {
     let fail = |reason| PictureError { path: path.to_owned(), reason };
     let io = |error: std::io::Error| fail(Reason::Io(error.to_string()));
-    let mut bytes = Vec::new();
     let metadata = std::fs::metadata(path).map_err(io)?;
     if metadata.is_dir() {
         return Err(fail(Reason::Folder));
     }
-    BufReader::new(File::open(path).map_err(io)?).read_to_end(&mut bytes).map_err(io)?;
-    gray_from_bytes(&bytes).map_err(fail)
+    let mut file = BufReader::new(File::open(path).map_err(io)?);
+    if !file.fill_buf().map_err(io)?.starts_with(&[0xFF, 0xD8]) {
+        return decode(file).map_err(fail);
+    }
+    // A JPEG is looked through for its end first; other files are decoded as they are read.
+    let mut bytes = Vec::new();
+    file.read_to_end(&mut bytes).map_err(io)?;
+    if is_cut_jpeg(&bytes) {
+        return Err(fail(Reason::Damaged("its end is missing".to_owned())));
+    }
+    decode(Cursor::new(bytes)).map_err(fail)
 }
 
-fn gray_from_bytes(bytes: &[u8]) -> Result<GrayImage, Reason> {
-    if bytes.is_empty() {
+fn decode(mut file: impl BufRead + Seek) -> Result<GrayImage, Reason> {
+    if file.fill_buf().map_err(|error| Reason::Io(error.to_string()))?.is_empty() {
         return Err(Reason::Empty);
     }
-    if is_cut_jpeg(bytes) {
-        return Err(Reason::Damaged("its end is missing".to_owned()));
-    }
-    let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| Reason::Io(e.to_string()))?;
+    let reader = ImageReader::new(file).with_guessed_format().map_err(|error| Reason::Io(error.to_string()))?;
     if reader.format().is_none() {
         return Err(Reason::NotAnImage);
     }

@@ -1,5 +1,6 @@
 //! `daymark bench`: how long the stages take on this machine, on one thread.
 
+use std::fmt::Write as _;
 use std::io::{self, Write};
 use std::path::PathBuf;
 use std::time::Instant;
@@ -259,7 +260,7 @@ fn as_text(document: &Document) -> String {
     ];
     for (stage, unit, times) in rows {
         let stage = format!("{stage}, {unit}");
-        text.push_str(&format!("{stage:<46}{:>10.3}{:>10.3}\n", times.min, times.median));
+        let _ = writeln!(text, "{stage:<46}{:>10.3}{:>10.3}", times.min, times.median);
     }
     text
 }
