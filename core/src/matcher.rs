@@ -15,6 +15,10 @@ use crate::transform::{Homography, Shape, WeightedPair};
 /// Fewer candidates than this propose nothing.
 const LEAST_CANDIDATES: usize = 3;
 
+/// A map with fewer corners in its favour is none: four points fix a homography, and what speaks for a building must be
+/// more than the map was made from.
+const LEAST_SUPPORTING: u16 = 6;
+
 /// How well a stored view fits a frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ViewMatch {
@@ -91,6 +95,9 @@ impl<const STORED: usize, const CANDIDATES: usize, const BLOCKS: usize> Matcher<
             let Some(refined) = refined else { continue };
             let corner_evidence = weigh(kernels, &pairing, &refined, &mut self.corners);
             let supporting_corners = self.corners.iter().filter(|corner| corner.evidence > 0).count() as u16;
+            if supporting_corners < LEAST_SUPPORTING {
+                continue;
+            }
             let Refined { frame_from_view, shape, .. } = refined;
             let evidence = total(corner_evidence, supporting_corners, hypothesis.support, shape);
             if best.is_none_or(|best| evidence > best.evidence) {
