@@ -277,7 +277,7 @@ fn a_table_is_listed_shown_and_verified() {
     );
     let view = &document["view_list"][0];
     assert_eq!(keys(view), ["bytes", "corners", "corners_per_level", "height_px", "view", "width_px"]);
-    assert_eq!((&view["view"], &view["width_px"], &view["height_px"]), (&json!(1), &json!(320), &json!(240)));
+    assert_eq!((&view["view"], &view["width_px"], &view["height_px"]), (&json!(1), &json!(640), &json!(480)));
     let levels: u64 = view["corners_per_level"].as_array().expect("levels").iter().filter_map(Value::as_u64).sum();
     assert_eq!(view["corners"], levels);
     let ran = town.run(&["table", "show", "town.daymark", "mil"]);
