@@ -59,7 +59,7 @@ pub struct CornerEvidence {
 /// For a stored corner that maps into the frame, of the `m` query corners within 10 px and one level the nearest
 /// signature (distance `d`) counts: `a = surprise(d) - commonness - log2 m` and `b = log2(n / (1 + rank)) - log2 m`, where `rank`
 /// of the frame's `n` corners elsewhere are nearer than `d`. The rank devalues windows that match everywhere. The
-/// table [`EVIDENCE`] turns `a` and `b` into bits. A query corner supports one stored corner only. The sum over each
+/// table of `model.rs` turns `a` and `b` into bits. A query corner supports one stored corner only. The sum over each
 /// of 6 x 6 cells of the view saturates, so that one sign or tree cannot carry the answer.
 pub fn weigh<K: Kernels, const QUERY: usize, const CORNERS: usize>(
     kernels: &K,
