@@ -52,11 +52,6 @@ impl Hypotheses {
         Self { list: Vec::new() }
     }
 
-    /// Forgets all.
-    pub fn clear(&mut self) {
-        self.list.clear();
-    }
-
     /// A hypothesis of this support or less cannot enter.
     pub fn bound(&self) -> i32 {
         let weakest = if self.list.is_full() { self.list.last().map_or(0, |(last, _)| last.support) } else { 0 };
