@@ -18,6 +18,8 @@
 //! Foundations: [`math`] (the only caller of `libm`), [`point`] (frames of reference), [`profile`], [`kernel`] (the inner
 //! loops, which a caller may compile for wider instructions), [`transform`], [`linear`] and [`geometry`] (hulls and
 //! orientation, exact). [`capacity`] sizes it all for a small device.
+//! loops, which a caller may compile for wider instructions), [`transform`] and [`linear`]. [`capacity`] sizes it all for
+//! a small device. [`mesh`] makes many corresponding points of few.
 //!
 //! A frame against a table in memory or flash:
 //!
@@ -69,6 +71,7 @@ mod model;
 pub mod linear;
 pub mod transform;
 pub mod geometry;
+pub mod mesh;
 
 pub mod image;
 pub mod tone;
