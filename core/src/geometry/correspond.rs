@@ -1,0 +1,278 @@
+//! Which corner is which: proposals of nested hulls and local arrangements, verified by one map or, where relief forbids
+//! one map, by their neighbours and the epipolar constraint.
+
+use heapless::Vec;
+
+use super::agreement::{Agreement, BestMap, NoAgreement};
+use super::arrangement::{self, Arrangement};
+use super::consensus::{Consensus, Supported};
+use super::epipolar::{AffineEpipolar, JointPoint};
+use super::error::GeometryError;
+use super::layers::HullLayers;
+use super::proposal::{Pairing, Proposals};
+use super::shift::{self, LayerQuad};
+use super::sort::sort_by;
+use crate::point::ImagePoint;
+
+/// Bits that a pair needs from its neighbours.
+const LEAST_SUPPORT: f32 = 20.0;
+/// Correspondences of a scene with relief, at least: the epipolar constraint has four unknowns.
+const LEAST_RELIEF: usize = 12;
+/// Share of the smaller picture's corners that an answer about relief must explain.
+const LEAST_SHARE: f64 = 0.4;
+/// Share of the chosen pairs that must satisfy the epipolar constraint.
+const LEAST_CONSISTENT: f64 = 0.8;
+/// A pair is off if its distance from the constraint exceeds so many medians.
+const MOST_MEDIANS: f64 = 4.0;
+/// Medians below this, px, are noise of the corners.
+const LEAST_MEDIAN: f64 = 0.7;
+/// A median beyond this, px, is no weak perspective of one rigid scene.
+const MOST_MEDIAN: f64 = 4.0;
+/// Relief must explain this much more than one map does, or the map's answer stands: it is the more certain one.
+const RELIEF_GAIN: f64 = 1.1;
+
+/// Fits of the epipolar constraint, each without what the one before found off.
+const ROUNDS: usize = 4;
+
+/// Where proposals come from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Sources {
+    /// Nested hulls alone.
+    Layers,
+    /// Local arrangements alone.
+    Arrangements,
+    /// Both.
+    #[default]
+    Both,
+}
+
+/// What is known beforehand.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Settings {
+    /// Standard deviation of the noise of each coordinate of a corner, px.
+    pub sigma: f32,
+    /// Area of the second picture in which corners may lie, px².
+    pub area: f64,
+    /// Where proposals come from.
+    pub sources: Sources,
+}
+
+impl Settings {
+    /// Corners of half a pixel of noise in a picture of this size, from both sources.
+    pub fn of_picture(width: u32, height: u32) -> Self {
+        Self { sigma: 0.5, area: f64::from(width) * f64::from(height), sources: Sources::Both }
+    }
+}
+
+/// A correspondence.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Correspondence {
+    /// Which corners.
+    pub pair: Pairing,
+    /// px: the distance from where the map expects the corner, or from the epipolar constraint.
+    pub residual: f32,
+}
+
+/// What explains the correspondences.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Explanation {
+    /// One affine map explains them.
+    Map(BestMap),
+    /// No single map does; neighbours agree with one another, and all with the epipolar constraint.
+    Relief {
+        /// The constraint.
+        epipolar: AffineEpipolar,
+        /// Median distance from it, px.
+        median: f64,
+    },
+}
+
+/// Why there are no correspondences.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum NoCorrespondence {
+    /// What one map failed at; relief failed, too.
+    Map(NoAgreement),
+}
+
+/// The workspace: at most `POINTS` corners a picture in `LAYERS` hulls, the strongest `PROPOSALS` of each source with
+/// `CANDIDATES` different pairs.
+#[derive(Debug, Clone)]
+pub struct Correspond<const POINTS: usize, const LAYERS: usize, const PROPOSALS: usize, const CANDIDATES: usize> {
+    layers: [HullLayers<POINTS, LAYERS>; 2],
+    from_layers: Proposals<PROPOSALS>,
+    from_arrangements: Proposals<PROPOSALS>,
+    agreement: Agreement<POINTS>,
+    consensus: Consensus<POINTS, PROPOSALS, CANDIDATES>,
+    supported: Vec<Supported, POINTS>,
+    joint: Vec<JointPoint, POINTS>,
+    distances: Vec<f64, POINTS>,
+    found: Vec<Correspondence, POINTS>,
+}
+
+impl<const POINTS: usize, const LAYERS: usize, const PROPOSALS: usize, const CANDIDATES: usize>
+    Correspond<POINTS, LAYERS, PROPOSALS, CANDIDATES>
+{
+    /// An empty workspace.
+    pub const fn new() -> Self {
+        Self {
+            layers: [const { HullLayers::new() }; 2],
+            from_layers: Proposals::new(),
+            from_arrangements: Proposals::new(),
+            agreement: Agreement::new(),
+            consensus: Consensus::new(),
+            supported: Vec::new(),
+            joint: Vec::new(),
+            distances: Vec::new(),
+            found: Vec::new(),
+        }
+    }
+
+    /// Finds the correspondences of two sets of corners; [`Self::found`] lists them.
+    ///
+    /// `scratch` takes the arrangements of the second set ([`arrangement::scratch_length`]), `quads` those of its largest
+    /// layer ([`shift::quads_of`]).
+    ///
+    /// # Errors
+    /// Too many points or layers for this workspace, or coordinates out of range. That there is no answer is not an
+    /// error but the inner value.
+    pub fn correspond(
+        &mut self,
+        first: &[ImagePoint],
+        second: &[ImagePoint],
+        settings: Settings,
+        scratch: &mut [Arrangement],
+        quads: &mut [LayerQuad],
+    ) -> Result<Result<Explanation, NoCorrespondence>, GeometryError> {
+        self.found.clear();
+        self.propose(first, second, settings, scratch, quads)?;
+        let map = self.one_map(first, second, settings);
+        let explained = self.found.len();
+        // What one map explains is kept while relief is tried.
+        let one_map = self.found.clone();
+        if let Some(relief) = self.relief(first, second)
+            && self.found.len() as f64 > RELIEF_GAIN * explained as f64
+        {
+            return Ok(Ok(relief));
+        }
+        self.found = one_map;
+        Ok(map.map(Explanation::Map).map_err(NoCorrespondence::Map))
+    }
+
+    /// Enters the proposals of the chosen sources.
+    fn propose(
+        &mut self,
+        first: &[ImagePoint],
+        second: &[ImagePoint],
+        settings: Settings,
+        scratch: &mut [Arrangement],
+        quads: &mut [LayerQuad],
+    ) -> Result<(), GeometryError> {
+        let Self { layers: [first_layers, second_layers], from_layers, from_arrangements, .. } = self;
+        from_layers.clear();
+        from_arrangements.clear();
+        first_layers.peel(first)?;
+        second_layers.peel(second)?;
+        let Settings { sigma, area, sources } = settings;
+        if sources != Sources::Arrangements {
+            for (i, one) in (0_u8..).zip(first_layers.layers()) {
+                for (j, two) in (0_u8..).zip(second_layers.layers()).filter(|(j, _)| j.abs_diff(i) <= 1) {
+                    shift::propose((first, one, i), (second, two, j), sigma, area, quads, |p| from_layers.add(p));
+                }
+            }
+        }
+        if sources != Sources::Layers {
+            arrangement::propose(first, second, sigma, area, scratch, |p| from_arrangements.add(p));
+        }
+        Ok(())
+    }
+
+    fn one_map(
+        &mut self,
+        first: &[ImagePoint],
+        second: &[ImagePoint],
+        settings: Settings,
+    ) -> Result<BestMap, NoAgreement> {
+        let proposals = self.from_arrangements.iter().chain(self.from_layers.iter());
+        let map = self.agreement.find(first, second, proposals, settings.sigma)?;
+        for explained in self.agreement.explained() {
+            let _ = self.found.push(Correspondence { pair: explained.pair, residual: explained.residual });
+        }
+        Ok(map)
+    }
+
+    /// The pairs that neighbours support and the epipolar constraint allows; `None` if they are too few or contradict.
+    fn relief(&mut self, first: &[ImagePoint], second: &[ImagePoint]) -> Option<Explanation> {
+        let proposals = self.from_arrangements.iter().chain(self.from_layers.iter());
+        self.supported.clear();
+        let supported = &mut self.supported;
+        self.consensus.choose(proposals, LEAST_SUPPORT, |pair| {
+            // One to one: never more than POINTS.
+            let _ = supported.push(pair);
+        });
+        let chosen = self.supported.len();
+        let place = |points: &[ImagePoint], number: u16| {
+            points.get(usize::from(number)).copied().unwrap_or_default().to_pixels().map(f64::from)
+        };
+        let joint = |pair: Pairing| {
+            let ([a, b], [c, d]) = (place(first, pair.first), place(second, pair.second));
+            [a, b, c, d]
+        };
+        let mut fitted = None;
+        for _ in 0..ROUNDS {
+            self.joint.clear();
+            self.distances.clear();
+            for supported in &self.supported {
+                let _ = self.joint.push(joint(supported.pair));
+            }
+            let epipolar = AffineEpipolar::fit(&self.joint)?;
+            for pair in &self.joint {
+                let _ = self.distances.push(epipolar.distance(pair));
+            }
+            sort_by(&mut self.distances, |a, b| a.total_cmp(b).is_lt());
+            let median = self.distances.get(self.distances.len() / 2).copied()?;
+            let gate = MOST_MEDIANS * if median > LEAST_MEDIAN { median } else { LEAST_MEDIAN };
+            self.supported.retain(|supported| epipolar.distance(&joint(supported.pair)) <= gate);
+            fitted = Some((epipolar, median));
+        }
+        let (epipolar, median) = fitted?;
+        let (kept, smaller) = (self.supported.len(), first.len().min(second.len()));
+        let enough = kept >= LEAST_RELIEF && kept as f64 >= LEAST_SHARE * smaller as f64;
+        if !(enough && kept as f64 >= LEAST_CONSISTENT * chosen as f64 && median <= MOST_MEDIAN) {
+            return None;
+        }
+        self.found.clear();
+        for supported in &self.supported {
+            let residual = epipolar.distance(&joint(supported.pair)) as f32;
+            let _ = self.found.push(Correspondence { pair: supported.pair, residual });
+        }
+        Some(Explanation::Relief { epipolar, median })
+    }
+
+    /// The correspondences found last.
+    pub fn found(&self) -> &[Correspondence] {
+        &self.found
+    }
+
+    /// The layers of the first and the second set.
+    pub const fn layers(&self) -> &[HullLayers<POINTS, LAYERS>; 2] {
+        &self.layers
+    }
+
+    /// The proposals of nested hulls, most surprising first.
+    pub const fn from_layers(&self) -> &Proposals<PROPOSALS> {
+        &self.from_layers
+    }
+
+    /// The proposals of local arrangements, most surprising first.
+    pub const fn from_arrangements(&self) -> &Proposals<PROPOSALS> {
+        &self.from_arrangements
+    }
+}
+
+impl<const POINTS: usize, const LAYERS: usize, const PROPOSALS: usize, const CANDIDATES: usize> Default
+    for Correspond<POINTS, LAYERS, PROPOSALS, CANDIDATES>
+{
+    fn default() -> Self {
+        Self::new()
+    }
+}

@@ -1,0 +1,113 @@
+//! Proposals: a few pairs of corners whose places agree so well that chance hardly explains it.
+//!
+//! Every source of correspondences (nested hulls, local arrangements) yields proposals, and how surprising each is: the
+//! number of bits by which the space of accidents shrinks, `log2(area of the picture / area in which the last corner was
+//! expected)`, added up over the corners beyond the three that any affine map can join.
+
+use heapless::Vec;
+
+/// Corners in a proposal, at most.
+pub const MOST_PAIRS: usize = 5;
+
+/// Corner `first` of the first picture is corner `second` of the second: numbers in the caller's lists.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
+pub struct Pairing {
+    /// Number in the first list.
+    pub first: u16,
+    /// Number in the second list.
+    pub second: u16,
+}
+
+/// Where a proposal comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Origin {
+    /// Four vertices of two hull layers, in their cyclic order.
+    Layers {
+        /// Layer of the first picture, 0 is the outermost.
+        first: u8,
+        /// Layer of the second picture.
+        second: u8,
+        /// Vertices by which the second layer is shifted against the first.
+        shift: u16,
+    },
+    /// A corner and four of its neighbours.
+    Arrangement,
+}
+
+/// A few pairs that belong together.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Proposal {
+    /// The pairs: four or five.
+    pub pairs: Vec<Pairing, MOST_PAIRS>,
+    /// How surprising they would be by chance, in 1/256 bit.
+    pub surprise: i32,
+    /// Where it comes from.
+    pub origin: Origin,
+}
+
+/// The most surprising proposals so far, in falling order; of equally surprising ones the first stays first, and the
+/// weakest goes when there is no room.
+#[derive(Debug, Clone)]
+pub struct Proposals<const CAPACITY: usize> {
+    list: Vec<Proposal, CAPACITY>,
+    seen: usize,
+}
+
+impl<const CAPACITY: usize> Proposals<CAPACITY> {
+    /// None yet.
+    pub const fn new() -> Self {
+        Self { list: Vec::new(), seen: 0 }
+    }
+
+    /// Forgets all.
+    pub fn clear(&mut self) {
+        self.list.clear();
+        self.seen = 0;
+    }
+
+    /// Enters a proposal. Cost: at most `CAPACITY` moves.
+    pub fn add(&mut self, proposal: Proposal) {
+        self.seen = self.seen.saturating_add(1);
+        if self.list.is_full() {
+            if self.list.last().is_none_or(|weakest| weakest.surprise >= proposal.surprise) {
+                return;
+            }
+            self.list.pop();
+        }
+        // There is room now, or the capacity is zero and nothing can be kept.
+        let _ = self.list.push(proposal);
+        let mut at = self.list.len();
+        while at > 1
+            && let Some([before, after]) = self.list.get_mut(at - 2..at)
+            && before.surprise < after.surprise
+        {
+            core::mem::swap(before, after);
+            at -= 1;
+        }
+    }
+
+    /// The proposals, most surprising first.
+    pub fn iter(&self) -> core::slice::Iter<'_, Proposal> {
+        self.list.iter()
+    }
+
+    /// How many were offered, kept or not.
+    pub const fn seen(&self) -> usize {
+        self.seen
+    }
+}
+
+impl<'a, const CAPACITY: usize> IntoIterator for &'a Proposals<CAPACITY> {
+    type Item = &'a Proposal;
+    type IntoIter = core::slice::Iter<'a, Proposal>;
+
+    fn into_iter(self) -> Self::IntoIter {
+        self.iter()
+    }
+}
+
+impl<const CAPACITY: usize> Default for Proposals<CAPACITY> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
