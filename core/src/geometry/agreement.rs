@@ -23,9 +23,9 @@ const ROUNDS: usize = 4;
 /// Noise levels, as multiples of the expected one, at which the best map is tried.
 const NOISE_LEVELS: [f32; 3] = [1.0, 2.0, 3.0];
 /// Bits by which the best map must exceed the number of maps that could have been tried.
-const LEAST_BITS: f32 = 10.0;
+const LEAST_BITS: f32 = 20.0;
 /// A different map with more than this share of the best one's bits leaves the answer open.
-const RIVAL: f32 = 0.8;
+const RIVAL: f32 = 0.6;
 
 /// An affine map with what its fit knows about its own certainty.
 #[derive(Debug, Clone, Copy)]

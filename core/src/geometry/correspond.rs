@@ -28,9 +28,17 @@ const MOST_MEDIANS: f64 = 4.0;
 const LEAST_MEDIAN: f64 = 0.7;
 /// A median beyond this, px, is no weak perspective of one rigid scene.
 const MOST_MEDIAN: f64 = 4.0;
-/// Relief must explain this much more than one map does, or the map's answer stands: it is the more certain one.
-const RELIEF_GAIN: f64 = 1.1;
+/// One map that explains this share of the smaller picture's corners is the answer.
+const WHOLE: f64 = 0.7;
+/// Otherwise relief is, if it explains at least this much of what the map does: a map of a part errs at its edges.
+const LEAST_RELIEF_GAIN: f64 = 0.8;
 
+/// Proposals that must hold a pair of a scene with relief, all of whose other pairs stand as well.
+const WITNESSES: f64 = 2.0;
+/// The same for an answer that explains [`WHOLE`] of the corners.
+const FEW_WITNESSES: f64 = 1.0;
+/// Corners closer than this to another one, in 1/16 px, are not matched across relief, which may move them as far.
+const CROWDED: i32 = 4 * 16;
 /// Fits of the epipolar constraint, each without what the one before found off.
 const ROUNDS: usize = 4;
 
@@ -149,13 +157,42 @@ impl<const POINTS: usize, const LAYERS: usize, const PROPOSALS: usize, const CAN
         let explained = self.found.len();
         // What one map explains is kept while relief is tried.
         let one_map = self.found.clone();
-        if let Some(relief) = self.relief(first, second)
-            && self.found.len() as f64 > RELIEF_GAIN * explained as f64
+        let smaller = first.len().min(second.len());
+        if (explained as f64) < WHOLE * smaller as f64
+            && let Some(relief) = self.relief(first, second)
+            && self.found.len() as f64 > LEAST_RELIEF_GAIN * explained as f64
         {
             return Ok(Ok(relief));
         }
         self.found = one_map;
         Ok(map.map(Explanation::Map).map_err(NoCorrespondence::Map))
+    }
+
+    /// The pairs that proposals of the chosen sources support, one to one, before any verification; most supported first.
+    ///
+    /// # Errors
+    /// As [`Self::correspond`].
+    pub fn vote(
+        &mut self,
+        first: &[ImagePoint],
+        second: &[ImagePoint],
+        settings: Settings,
+        scratch: &mut [Arrangement],
+        quads: &mut [LayerQuad],
+    ) -> Result<&[Supported], GeometryError> {
+        self.propose(first, second, settings, scratch, quads)?;
+        self.support();
+        Ok(&self.supported)
+    }
+
+    fn support(&mut self) {
+        let proposals = self.from_arrangements.iter().chain(self.from_layers.iter());
+        self.supported.clear();
+        let supported = &mut self.supported;
+        self.consensus.choose(proposals, LEAST_SUPPORT, |pair| {
+            // One to one: never more than POINTS.
+            let _ = supported.push(pair);
+        });
     }
 
     /// Enters the proposals of the chosen sources.
@@ -202,13 +239,15 @@ impl<const POINTS: usize, const LAYERS: usize, const PROPOSALS: usize, const CAN
 
     /// The pairs that neighbours support and the epipolar constraint allows; `None` if they are too few or contradict.
     fn relief(&mut self, first: &[ImagePoint], second: &[ImagePoint]) -> Option<Explanation> {
-        let proposals = self.from_arrangements.iter().chain(self.from_layers.iter());
-        self.supported.clear();
-        let supported = &mut self.supported;
-        self.consensus.choose(proposals, LEAST_SUPPORT, |pair| {
-            // One to one: never more than POINTS.
-            let _ = supported.push(pair);
-        });
+        self.support();
+        let alone = |points: &[ImagePoint], number: u16| {
+            let here = points.get(usize::from(number)).copied().unwrap_or_default();
+            !(0_u16..).zip(points).any(|(other, point)| {
+                let (x, y) = (point.x - here.x, point.y - here.y);
+                other != number && x * x + y * y < CROWDED * CROWDED
+            })
+        };
+        self.supported.retain(|supported| alone(first, supported.pair.first) && alone(second, supported.pair.second));
         let chosen = self.supported.len();
         let place = |points: &[ImagePoint], number: u16| {
             points.get(usize::from(number)).copied().unwrap_or_default().to_pixels().map(f64::from)
@@ -235,6 +274,9 @@ impl<const POINTS: usize, const LAYERS: usize, const PROPOSALS: usize, const CAN
             fitted = Some((epipolar, median));
         }
         let (epipolar, median) = fitted?;
+        // What explains nearly all needs less to be believed.
+        let most = first.len().min(second.len()) as f64 * WHOLE;
+        self.keep_witnessed(if self.supported.len() as f64 >= most { FEW_WITNESSES } else { WITNESSES });
         let (kept, smaller) = (self.supported.len(), first.len().min(second.len()));
         let enough = kept >= LEAST_RELIEF && kept as f64 >= LEAST_SHARE * smaller as f64;
         if !(enough && kept as f64 >= LEAST_CONSISTENT * chosen as f64 && median <= MOST_MEDIAN) {
@@ -246,6 +288,25 @@ impl<const POINTS: usize, const LAYERS: usize, const PROPOSALS: usize, const CAN
             let _ = self.found.push(Correspondence { pair: supported.pair, residual });
         }
         Some(Explanation::Relief { epipolar, median })
+    }
+
+    /// Drops pairs with fewer than `least` proposals all of whose pairs still stand.
+    fn keep_witnessed(&mut self, least: f64) {
+        // In the order of the joint points: how many witnesses each pair has.
+        self.distances.clear();
+        for _ in &self.supported {
+            let _ = self.distances.push(0.0);
+        }
+        for proposal in self.from_arrangements.iter().chain(self.from_layers.iter()) {
+            let stands = |pair: &Pairing| self.supported.iter().any(|supported| supported.pair == *pair);
+            if proposal.pairs.iter().all(stands) {
+                for (count, supported) in self.distances.iter_mut().zip(&self.supported) {
+                    *count += f64::from(u8::from(proposal.pairs.contains(&supported.pair)));
+                }
+            }
+        }
+        let mut counts = self.distances.iter();
+        self.supported.retain(|_| counts.next().is_some_and(|count| *count >= least));
     }
 
     /// The correspondences found last.

@@ -8,6 +8,7 @@ pub mod demo;
 pub mod enroll;
 pub mod evaluate;
 pub mod recognize;
+pub mod study;
 pub mod table;
 
 use std::error::Error;
@@ -39,6 +40,8 @@ enum Command {
     Evaluate(evaluate::Args),
     /// Time the stages of recognition on this machine
     Bench(bench::Args),
+    /// Measure how well the parts work, on made scenes with known truth
+    Study(study::Args),
 }
 
 /// How a command ended, if not by an error.
@@ -75,6 +78,7 @@ impl Cli {
             Command::Table(args) => table::run(&args),
             Command::Evaluate(args) => evaluate::run(&args),
             Command::Bench(args) => bench::run(&args),
+            Command::Study(args) => study::run(&args),
         }
     }
 }

@@ -1,0 +1,26 @@
+//! `daymark study`: how well the parts work, measured on made scenes with known truth; one study a file.
+
+pub mod correspondence;
+
+use clap::{Args as ClapArgs, Subcommand};
+
+use super::{CommandError, Outcome};
+
+/// Arguments of `daymark study`.
+#[derive(Debug, ClapArgs)]
+pub struct Args {
+    #[command(subcommand)]
+    study: Study,
+}
+
+#[derive(Debug, Subcommand)]
+enum Study {
+    /// How many corners are matched, and how many wrongly, by their places alone
+    Correspondence(correspondence::Args),
+}
+
+pub(super) fn run(args: &Args) -> Result<Outcome, CommandError> {
+    match &args.study {
+        Study::Correspondence(args) => correspondence::run(args),
+    }
+}
