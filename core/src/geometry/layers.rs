@@ -8,8 +8,8 @@
 //! So the layers of a set do not depend on the order of its points, and an affine map that is exact in integers
 //! changes only where a layer begins and, if it mirrors, which way it goes.
 
+use super::chain::strict_hull;
 use super::error::GeometryError;
-use super::hull::strict_hull;
 use super::key::{self, Key};
 use crate::point::ImagePoint;
 
@@ -89,17 +89,15 @@ impl<const POINTS: usize, const LAYERS: usize> HullLayers<POINTS, LAYERS> {
     /// [`COORDINATE_LIMIT`](super::COORDINATE_LIMIT). There are no layers then, and no points.
     pub fn peel(&mut self, points: &[ImagePoint]) -> Result<(), GeometryError> {
         (self.layers, self.distinct, self.points) = (0, 0, 0);
-        let keys = key::fill(&mut self.left, points)?;
-        key::sort(keys);
         for (number, (same_as, layer)) in (0..).zip(self.same_as.iter_mut().zip(&mut self.layer_of)).take(points.len())
         {
             (*same_as, *layer) = (number, NONE);
         }
-        let distinct = key::distinct(keys, |number, first| {
+        let distinct = key::arrange(points, &mut self.left, &mut self.stack, |number, first| {
             if let Some(same_as) = self.same_as.get_mut(usize::from(number)) {
                 *same_as = first;
             }
-        });
+        })?;
         if distinct < points.len() {
             let merged = (0..).zip(&self.same_as).take(points.len()).filter(|(number, first)| number != *first);
             for (slot, (number, _)) in self.order.iter_mut().skip(distinct).zip(merged) {
@@ -116,7 +114,7 @@ impl<const POINTS: usize, const LAYERS: usize> HullLayers<POINTS, LAYERS> {
         let (mut remaining, mut layers, mut end) = (distinct, 0, 0);
         loop {
             let left = self.left.get_mut(..remaining).unwrap_or_default();
-            let vertices = strict_hull(left, &mut self.stack);
+            let vertices = strict_hull(left, &mut self.stack).vertices;
             if vertices < 3 {
                 for (slot, key) in self.order.iter_mut().skip(end).zip(left) {
                     *slot = key.number();

@@ -14,7 +14,9 @@
 
 pub mod predicate;
 pub mod error;
+mod sort;
 mod key;
+mod chain;
 pub mod hull;
 pub mod layers;
 
