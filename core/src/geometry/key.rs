@@ -27,6 +27,12 @@ impl Key {
         Self(x << Self::X_SHIFT | y << Self::Y_SHIFT | (number as u64 & 0xffff))
     }
 
+    /// A place without a point.
+    #[inline]
+    pub(super) fn at(x: u64, y: u64) -> Self {
+        Self(x << Self::X_SHIFT | y << Self::Y_SHIFT)
+    }
+
     /// From the leftmost point.
     #[inline]
     pub(super) fn x(self) -> i64 {

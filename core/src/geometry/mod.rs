@@ -17,6 +17,7 @@ pub mod error;
 mod sort;
 mod key;
 mod chain;
+mod fence;
 pub mod hull;
 pub mod layers;
 
