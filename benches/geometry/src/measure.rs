@@ -1,7 +1,8 @@
 //! Programs in turns over the same sets.
 
 use std::hint::black_box;
-use std::time::Instant;
+
+use cpu_time::ThreadTime;
 
 use crate::sets::Sets;
 
@@ -30,11 +31,12 @@ pub trait Program {
     fn run(&mut self, number: usize) -> Found;
 }
 
-/// Sets timed as one sample, so that the clock costs nothing.
-const BATCH: usize = 16;
+/// Points timed as one sample, so that the clock costs nothing.
+const BATCH: usize = 1_000;
 
-/// Each program runs over each set once; the programs take turns every `BATCH` sets, and another begins each time.
-/// Prints the medians of the samples and the ratios to the first program; whether all agree.
+/// Each program runs over each set once; the programs take turns every few sets, and another begins each time. The clock
+/// is the thread's own, so other programs on the machine disturb little. Prints the medians of the samples and the ratios
+/// to the first program; whether all agree.
 pub fn compare(task: &str, sets: &Sets, programs: &mut [Box<dyn Program>]) -> bool {
     let count = programs.len();
     let mut samples = vec![Vec::new(); count];
@@ -42,11 +44,11 @@ pub fn compare(task: &str, sets: &Sets, programs: &mut [Box<dyn Program>]) -> bo
     for program in &mut *programs {
         program.prepare(&sets.all);
     }
-    let batch = BATCH.min(1.max(sets.all.len() / 24));
+    let batch = (BATCH / sets.size).max(1);
     for (turn, first) in (0..sets.all.len() - batch + 1).step_by(batch).enumerate() {
         for place in 0..count {
             let which = (place + turn) % count;
-            let start = Instant::now();
+            let start = ThreadTime::now();
             for number in first..first + batch {
                 found[which] += black_box(programs[which].run(black_box(number)));
             }

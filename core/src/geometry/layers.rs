@@ -18,7 +18,7 @@ use crate::point::ImagePoint;
 const NONE: u16 = u16::MAX;
 
 /// Fewer points are all looked at for each layer.
-const MANY: usize = 96;
+const MANY: usize = 256;
 
 /// What is left within the innermost layer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
