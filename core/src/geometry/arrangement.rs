@@ -165,7 +165,7 @@ pub fn propose(
         }
     });
     let entries = scratch.get_mut(..count).unwrap_or_default();
-    super::sort::sort_by(entries, |a, b| a.key.total_cmp(&b.key).then_with(|| a.corners.cmp(&b.corners)).is_lt());
+    super::heap_sort::sort_by(entries, |a, b| a.key.total_cmp(&b.key).then_with(|| a.corners.cmp(&b.corners)).is_lt());
     let widest = entries.iter().fold(0.0_f32, |most, entry| if entry.spread > most { entry.spread } else { most });
     each(first, |corners| {
         let Some(wanted) = describe(first, corners, sigma) else { return };

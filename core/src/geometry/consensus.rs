@@ -9,7 +9,7 @@
 use heapless::Vec;
 
 use super::proposal::{MOST_PAIRS, Pairing, Proposal};
-use super::sort::sort_by;
+use super::heap_sort::sort_by;
 
 /// Rounds of choosing; later ones change hardly anything.
 const ROUNDS: usize = 6;

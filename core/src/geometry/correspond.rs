@@ -11,7 +11,7 @@ use super::error::GeometryError;
 use super::layers::HullLayers;
 use super::proposal::{Pairing, Proposals};
 use super::shift::{self, LayerQuad};
-use super::sort::sort_by;
+use super::heap_sort::sort_by;
 use crate::point::ImagePoint;
 
 /// Bits that a pair needs from its neighbours.

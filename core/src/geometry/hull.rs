@@ -1,7 +1,8 @@
 //! The convex hull of a set of points.
 
+use super::chain::strict_hull;
 use super::error::GeometryError;
-use super::key::{self, Key, twice_area};
+use super::key::{self, Key};
 use crate::point::ImagePoint;
 
 /// The convex hull of a set, by the numbers of its strict vertices: no vertex lies on a line with its neighbours, none
@@ -41,11 +42,9 @@ impl<const POINTS: usize> ConvexHull<POINTS> {
     /// More than `POINTS` points, or one beyond [`COORDINATE_LIMIT`](super::COORDINATE_LIMIT). The hull is then empty.
     pub fn enclose(&mut self, points: &[ImagePoint]) -> Result<Hull<'_>, GeometryError> {
         self.count = 0;
-        let keys = key::fill(&mut self.keys, points)?;
-        key::sort(keys);
-        let distinct = key::distinct(keys, |_, _| {});
-        let keys = keys.get(..distinct).unwrap_or(&[]);
-        self.count = strict_hull(keys, &mut self.stack);
+        let distinct = key::arrange(points, &mut self.keys, &mut self.stack, |_, _| {})?;
+        let keys = self.keys.get(..distinct).unwrap_or(&[]);
+        self.count = strict_hull(keys, &mut self.stack).vertices;
         for (vertex, key) in self.vertices.iter_mut().zip(&self.stack).take(self.count) {
             *vertex = key.number();
         }
@@ -67,44 +66,6 @@ impl<const POINTS: usize> Default for ConvexHull<POINTS> {
     fn default() -> Self {
         Self::new()
     }
-}
-
-/// Writes the strict vertices of sorted, distinct keys to `stack`, clockwise from the first key, and returns their
-/// number: two if the keys are on one line. Needs room for as many as there are keys.
-///
-/// Monotone chain (Andrew 1979), the points above and below the line from the first to the last apart.
-pub(super) fn strict_hull(keys: &[Key], stack: &mut [Key]) -> usize {
-    let (&[first, ref between @ .., last], [bottom, ..]) = (keys, &mut *stack) else {
-        if let ([only], [bottom, ..]) = (keys, stack) {
-            *bottom = *only;
-            return 1;
-        }
-        return 0;
-    };
-    *bottom = first;
-    let above = between.iter().filter(|&&key| twice_area(first, last, key) < 0);
-    let top = chain(stack, 0, above.chain([&last]));
-    let below = between.iter().rev().filter(|&&key| twice_area(first, last, key) > 0);
-    // The first key closes the polygon and is not repeated.
-    chain(stack, top, below.chain([&first]))
-}
-
-/// Continues a chain that turns clockwise from `stack[bottom]`, and returns where it ends.
-fn chain<'a>(stack: &mut [Key], bottom: usize, keys: impl Iterator<Item = &'a Key>) -> usize {
-    let mut top = bottom;
-    for &key in keys {
-        while top > bottom
-            && let Some(&[before, latest]) = stack.get(top - 1..=top)
-            && twice_area(before, latest, key) <= 0
-        {
-            top -= 1;
-        }
-        top += 1;
-        if let Some(free) = stack.get_mut(top) {
-            *free = key;
-        }
-    }
-    top
 }
 
 #[cfg(test)]

@@ -8,13 +8,17 @@
 //! So the layers of a set do not depend on the order of its points, and an affine map that is exact in integers
 //! changes only where a layer begins and, if it mirrors, which way it goes.
 
+use super::chain::{Outline, strict_hull};
 use super::error::GeometryError;
-use super::hull::strict_hull;
+use super::fence::{Fence, Parking};
 use super::key::{self, Key};
 use crate::point::ImagePoint;
 
 /// No layer; there are fewer layers than this.
 const NONE: u16 = u16::MAX;
+
+/// Fewer points are all looked at for each layer.
+const MANY: usize = 256;
 
 /// What is left within the innermost layer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -89,17 +93,15 @@ impl<const POINTS: usize, const LAYERS: usize> HullLayers<POINTS, LAYERS> {
     /// [`COORDINATE_LIMIT`](super::COORDINATE_LIMIT). There are no layers then, and no points.
     pub fn peel(&mut self, points: &[ImagePoint]) -> Result<(), GeometryError> {
         (self.layers, self.distinct, self.points) = (0, 0, 0);
-        let keys = key::fill(&mut self.left, points)?;
-        key::sort(keys);
         for (number, (same_as, layer)) in (0..).zip(self.same_as.iter_mut().zip(&mut self.layer_of)).take(points.len())
         {
             (*same_as, *layer) = (number, NONE);
         }
-        let distinct = key::distinct(keys, |number, first| {
+        let distinct = key::arrange(points, &mut self.left, &mut self.stack, |number, first| {
             if let Some(same_as) = self.same_as.get_mut(usize::from(number)) {
                 *same_as = first;
             }
-        });
+        })?;
         if distinct < points.len() {
             let merged = (0..).zip(&self.same_as).take(points.len()).filter(|(number, first)| number != *first);
             for (slot, (number, _)) in self.order.iter_mut().skip(distinct).zip(merged) {
@@ -113,38 +115,58 @@ impl<const POINTS: usize, const LAYERS: usize> HullLayers<POINTS, LAYERS> {
 
     /// Takes the sorted points `left` apart and returns the number of layers.
     fn peel_distinct(&mut self, distinct: usize) -> Result<usize, GeometryError> {
-        let (mut remaining, mut layers, mut end) = (distinct, 0, 0);
+        let mut left = self.left.get_mut(..distinct).unwrap_or_default();
+        let mut parking = Parking { active: distinct, parked: distinct };
+        let (mut fence, mut refused) = (None, 0);
+        let (mut layers, mut end) = (0, 0);
         loop {
-            let left = self.left.get_mut(..remaining).unwrap_or_default();
-            let vertices = strict_hull(left, &mut self.stack);
-            if vertices < 3 {
-                for (slot, key) in self.order.iter_mut().skip(end).zip(left) {
+            let parked = left.len() - parking.parked;
+            let active = left.get_mut(..parking.active).unwrap_or_default();
+            let outline = strict_hull(active, &mut self.stack);
+            if parked > 0 && !fence.is_some_and(|fence: Fence| fence.is_within(&self.stack, outline)) {
+                // What is parked may reach beyond the hull: park less, or nothing if that did not help before.
+                fence = if parked >= MANY && refused < 2 { fence_within(&self.stack, outline, parked) } else { None };
+                parking.release(left, &mut self.stack, fence.as_ref());
+                refused += 1;
+                continue;
+            }
+            refused = 0;
+            if outline.vertices < 3 {
+                for (slot, key) in self.order.iter_mut().skip(end).zip(active) {
                     *slot = key.number();
                 }
                 return Ok(layers);
             }
             let Some(layer_end) = self.ends.get_mut(layers) else {
-                return Err(GeometryError::TooManyLayers { capacity: LAYERS, points_left: remaining });
+                return Err(GeometryError::TooManyLayers { capacity: LAYERS, points_left: parking.active + parked });
             };
-            for (slot, key) in self.order.iter_mut().skip(end).zip(self.stack.iter().take(vertices)) {
+            for (slot, key) in self.order.iter_mut().skip(end).zip(self.stack.iter().take(outline.vertices)) {
                 *slot = key.number();
                 if let Some(layer) = self.layer_of.get_mut(usize::from(key.number())) {
                     *layer = layers as u16;
                 }
             }
-            end += vertices;
+            end += outline.vertices;
             *layer_end = end as u16;
             layers += 1;
             let mut kept = 0;
-            for at in 0..remaining {
-                let Some(&key) = left.get(at) else { break };
+            for at in 0..parking.active {
+                let Some(&key) = active.get(at) else { break };
                 let stays = self.layer_of.get(usize::from(key.number())) == Some(&NONE);
-                if let Some(slot) = left.get_mut(kept) {
+                if let Some(slot) = active.get_mut(kept) {
                     *slot = key;
                 }
                 kept += usize::from(stays);
             }
-            remaining = kept;
+            parking.active = kept;
+            if parked == 0 && kept >= MANY {
+                fence = fence_within(&self.stack, outline, kept);
+                if fence.is_some() {
+                    left = core::mem::take(&mut left).get_mut(..kept).unwrap_or_default();
+                    parking = Parking { active: 0, parked: 0 };
+                    parking.release(left, &mut self.stack, fence.as_ref());
+                }
+            }
         }
     }
 
@@ -206,6 +228,16 @@ impl<const POINTS: usize, const LAYERS: usize> HullLayers<POINTS, LAYERS> {
     pub fn duplicates(&self) -> &[u16] {
         self.order.get(self.distinct..self.points).unwrap_or(&[])
     }
+}
+
+/// A fence so deep within a hull that it costs least to have `parked` points looked at whenever it is reached.
+///
+/// With points spread evenly a layer has about as many as the latest, h of m. Between hull and fence t layers have t h / 2
+/// at work on the average; all m are looked at once in t layers. The sum is least for t ~ sqrt(m / h), which is the share
+/// sqrt(h / m) of the area and half of that of the way to the middle.
+fn fence_within(hull: &[Key], outline: Outline, parked: usize) -> Option<Fence> {
+    let share = (((outline.vertices as u64) << 32) / (parked as u64).max(1)).isqrt() / 2;
+    Fence::within(hull, outline, share.min(1 << 15))
 }
 
 impl<const POINTS: usize, const LAYERS: usize> Default for HullLayers<POINTS, LAYERS> {

@@ -27,10 +27,13 @@
 
 pub mod predicate;
 pub mod error;
-mod key;
 mod sort;
+mod key;
+mod chain;
+mod fence;
 pub mod hull;
 pub mod layers;
+mod heap_sort;
 pub mod quad;
 pub mod proposal;
 pub mod shift;

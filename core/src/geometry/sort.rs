@@ -1,58 +1,100 @@
-//! Heap sort for core: no panic path, no memory, and the order is the caller's.
+//! Sorts the keys of points.
 
-/// Sorts by `less`, which must be a strict total order for a written result. `O(n log n)`, in place, not stable.
-pub(super) fn sort_by<T: Copy>(list: &mut [T], less: impl Fn(&T, &T) -> bool + Copy) {
-    for at in (0..list.len() / 2).rev() {
-        sink(list, at, less);
-    }
-    let mut heap = list;
-    while let Some((last, rest)) = heap.split_last_mut() {
-        let Some(top) = rest.first_mut() else { return };
-        core::mem::swap(top, last);
-        sink(rest, 0, less);
-        heap = rest;
-    }
-}
+use super::key::Key;
 
-fn sink<T: Copy>(heap: &mut [T], mut at: usize, less: impl Fn(&T, &T) -> bool) {
-    let Some(&sinking) = heap.get(at) else { return };
-    loop {
-        let mut child = 2 * at + 1;
-        let Some(left) = heap.get(child) else { break };
-        if heap.get(child + 1).is_some_and(|right| less(left, right)) {
-            child += 1;
-        }
-        let Some(&larger) = heap.get(child) else { break };
-        if !less(&sinking, &larger) {
-            break;
-        }
-        if let Some(place) = heap.get_mut(at) {
-            *place = larger;
-        }
-        at = child;
-    }
-    if let Some(place) = heap.get_mut(at) {
-        *place = sinking;
-    }
-}
+const DIGIT_BITS: u32 = 8;
+const DIGITS: usize = 1 << DIGIT_BITS;
 
-#[cfg(test)]
-mod tests {
-    use super::sort_by;
+/// Sets of more points are sorted digit by digit.
+const FEW: usize = 512;
+/// The most keys that one digit may have for an insertion sort to follow.
+const CROWD: u16 = 16;
 
-    #[test]
-    fn sorts_like_the_library() {
-        let mut state = 1_u32;
-        for length in 0..70 {
-            let mut list = [0_u32; 70];
-            for value in &mut list {
-                state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-                *value = state >> 27;
+/// Sorts keys, of which those at the same place already have ascending numbers and whose coordinates span `width` and
+/// `height`. `scratch` needs room for as many.
+///
+/// A few keys, spread well: by the highest digit of x, then by insertion. Else by counting, from the lowest digit of y
+/// to the highest of x: O(n) for n keys, and two passes for each eight bits that `width` and `height` have.
+pub(super) fn sort(keys: &mut [Key], scratch: &mut [Key], width: u64, height: u64) {
+    let Some(scratch) = scratch.get_mut(..keys.len()) else { return };
+    let (x_bits, y_bits) = (u64::BITS - width.leading_zeros(), u64::BITS - height.leading_zeros());
+    if keys.len() <= FEW {
+        // About as many digits as keys.
+        let bits = (usize::BITS - keys.len().leading_zeros()).min(DIGIT_BITS);
+        let shift = Key::X_SHIFT + x_bits.saturating_sub(bits);
+        let mut starts = count(keys, shift);
+        if starts.iter().all(|&crowd| crowd <= CROWD) {
+            accumulate(&mut starts);
+            distribute(keys, scratch, &mut starts, shift);
+            for (key, sorted) in keys.iter_mut().zip(scratch) {
+                *key = *sorted;
             }
-            let mut expected = list;
-            expected[..length].sort_unstable();
-            sort_by(&mut list[..length], |a, b| a < b);
-            assert_eq!(list, expected);
+            insert(keys);
+            return;
+        }
+    }
+    let (mut from, mut to) = (keys, scratch);
+    let mut moved = false;
+    for (bottom, bits) in [(Key::Y_SHIFT, y_bits), (Key::X_SHIFT, x_bits)] {
+        for shift in (bottom..bottom + bits).step_by(DIGIT_BITS as usize) {
+            let mut starts = count(from, shift);
+            accumulate(&mut starts);
+            distribute(from, to, &mut starts, shift);
+            (from, to) = (to, from);
+            moved = !moved;
+        }
+    }
+    if moved {
+        // `from` holds the result, and is the scratch.
+        for (key, sorted) in to.iter_mut().zip(from) {
+            *key = *sorted;
+        }
+    }
+}
+
+fn digit(key: Key, shift: u32) -> usize {
+    (key.0 >> shift) as usize % DIGITS
+}
+
+fn count(keys: &[Key], shift: u32) -> [u16; DIGITS] {
+    let mut counts = [0; DIGITS];
+    for &key in keys {
+        counts[digit(key, shift)] += 1;
+    }
+    counts
+}
+
+/// Counts become the places where each digit starts.
+fn accumulate(counts: &mut [u16; DIGITS]) {
+    let mut start = 0;
+    for count in counts {
+        (*count, start) = (start, start + *count);
+    }
+}
+
+fn distribute(from: &[Key], to: &mut [Key], starts: &mut [u16; DIGITS], shift: u32) {
+    for &key in from {
+        let start = &mut starts[digit(key, shift)];
+        if let Some(place) = to.get_mut(usize::from(*start)) {
+            *place = key;
+        }
+        *start += 1;
+    }
+}
+
+fn insert(keys: &mut [Key]) {
+    for end in 1..keys.len() {
+        let Some(&key) = keys.get(end) else { return };
+        let mut at = end;
+        while at > 0
+            && let Some([before, place]) = keys.get_mut(at - 1..=at)
+            && *before > key
+        {
+            *place = *before;
+            at -= 1;
+        }
+        if let Some(place) = keys.get_mut(at) {
+            *place = key;
         }
     }
 }

@@ -36,7 +36,7 @@ pub fn ordered<'a>(points: &[ImagePoint], scratch: &'a mut [Triangle]) -> &'a [T
         }
     }
     let triangles = scratch.get_mut(..count).unwrap_or_default();
-    super::sort::sort_by(triangles, |a, b| (a.area, a.corners) < (b.area, b.corners));
+    super::heap_sort::sort_by(triangles, |a, b| (a.area, a.corners) < (b.area, b.corners));
     triangles
 }
 

@@ -1,0 +1,109 @@
+//! Point sets, each one different, so that no branch predictor learns them.
+
+use std::path::Path;
+
+use daymark_core::extract::{Extractor, FeatureSet, FrontEnd};
+use daymark_core::image::GrayView;
+use daymark_core::kernel::Portable;
+use daymark_core::point::{ImagePoint, SUBPIXEL};
+use daymark_core::pyramid::level_bytes;
+use daymark_core::tone::TonedFrame;
+
+/// Points timed for each program, over all sets of a size.
+const POINTS: usize = 400_000;
+
+/// Where points come from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Source {
+    /// Uniform in a frame of 640 x 480 px.
+    Frame,
+    /// Uniform in a square of 65,536 steps.
+    Square,
+    /// Chosen from the corners of the committed pictures, each set under an affine map of its own.
+    Corners,
+}
+
+impl Source {
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Frame => "frame",
+            Self::Square => "square",
+            Self::Corners => "corners",
+        }
+    }
+}
+
+pub struct Sets {
+    pub source: Source,
+    pub size: usize,
+    pub all: Vec<Vec<ImagePoint>>,
+}
+
+impl Sets {
+    pub fn new(source: Source, size: usize) -> Self {
+        let mut random = Random(7);
+        let pictures = if source == Source::Corners { corners() } else { Vec::new() };
+        let all = (0..(POINTS / size).max(24)).map(|_| match source {
+            Source::Frame => random.points(size, 640 * SUBPIXEL, 480 * SUBPIXEL),
+            Source::Square => random.points(size, 1 << 16, 1 << 16),
+            Source::Corners => {
+                let picture = &pictures[random.below(pictures.len() as i32) as usize];
+                random.mapped(random.clone().chosen(picture, size))
+            }
+        });
+        Self { source, size, all: all.collect() }
+    }
+}
+
+/// SplitMix64.
+#[derive(Clone)]
+struct Random(u64);
+
+impl Random {
+    fn below(&mut self, end: i32) -> i32 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mixed = (self.0 ^ self.0 >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let mixed = (mixed ^ mixed >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((mixed ^ mixed >> 31) % end as u64) as i32
+    }
+
+    fn points(&mut self, count: usize, width: i32, height: i32) -> Vec<ImagePoint> {
+        (0..count).map(|_| ImagePoint::new(self.below(width), self.below(height))).collect()
+    }
+
+    fn chosen(&mut self, points: &[ImagePoint], count: usize) -> Vec<ImagePoint> {
+        let mut points = points.to_vec();
+        for at in 0..count {
+            let other = at + self.below((points.len() - at) as i32) as usize;
+            points.swap(at, other);
+        }
+        points.truncate(count);
+        points
+    }
+
+    /// Turned, stretched and sheared by up to a quarter.
+    fn mapped(&mut self, points: Vec<ImagePoint>) -> Vec<ImagePoint> {
+        let [a, b, c, d] = [1_024, 0, 0, 1_024].map(|unit| unit + self.below(512) - 256);
+        let map = |p: ImagePoint| ImagePoint::new((a * p.x + b * p.y) >> 10, (c * p.x + d * p.y) >> 10);
+        points.into_iter().map(map).collect()
+    }
+}
+
+/// The corners of each committed picture.
+fn corners() -> Vec<Vec<ImagePoint>> {
+    const FRONT_END: FrontEnd = FrontEnd { features: 300, cell_share_tenths: 12 };
+    let files = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures/files");
+    let names = (1..=8).flat_map(|tower| ["left", "right"].map(|side| format!("tower-{tower}-{side}.pgm")));
+    names
+        .map(|name| {
+            let file = std::fs::read(files.join(name)).expect("a committed picture");
+            let frame = GrayView::new(&file[file.len() - 320 * 240..], 320, 240, 320).expect("a frame");
+            let (mut toned, mut levels) = (vec![0; 320 * 240], vec![0; level_bytes(320, 240)]);
+            let toned = TonedFrame::write(&Portable, frame, &mut toned).expect("enough memory");
+            let mut features = FeatureSet::<300>::new();
+            let mut extractor = Box::new(Extractor::<48, { FRONT_END.slots() }>::new());
+            extractor.extract(&Portable, toned, FRONT_END, &mut levels, &mut features).expect("enough memory");
+            features.view().positions.to_vec()
+        })
+        .collect()
+}

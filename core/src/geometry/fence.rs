@@ -1,0 +1,204 @@
+//! A polygon deep within a hull: what it holds needs no look until the layers come near.
+
+use super::chain::Outline;
+use super::key::{Key, Line};
+
+/// Corners of each chain of a fence, at most.
+const CORNERS: usize = 16;
+
+/// Two chains from the same left end to the same right end, both with strictly ascending x. A key is within if it is
+/// on or below (as seen) the upper chain and on or above the lower one.
+///
+/// Corners are rounded to the grid, so a chain may have dents. It does not matter: if the corners of the upper chain are
+/// below the upper chain of a hull, which bulges, so is everything below the fence's; likewise for the lower one.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Fence {
+    upper: Chain,
+    lower: Chain,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Chain {
+    corners: [Key; CORNERS],
+    count: usize,
+}
+
+impl Fence {
+    /// A fence whose corners are some of a hull's vertices, each moved by `share / 2^16` of the way to their mean.
+    /// None if it would have no width.
+    pub(super) fn within(hull: &[Key], outline: Outline, share: u64) -> Option<Self> {
+        let hull = hull.get(..outline.vertices)?;
+        let count = u64::try_from(outline.vertices).ok().filter(|&count| count > 0)?;
+        let (x, y) = hull.iter().fold((0, 0), |(x, y), key| (x + key.x() as u64, y + key.y() as u64));
+        let middle = (x / count, y / count);
+        let inwards = |key: &Key| {
+            let moved = |from: i64, to: u64| ((from as u64 * ((1 << 16) - share)) + to * share) >> 16;
+            Key::at(moved(key.x(), middle.0), moved(key.y(), middle.1))
+        };
+        let first = hull.first()?;
+        let upper = hull.get(..=outline.turn)?;
+        let lower = hull.get(outline.turn..)?;
+        Some(Self {
+            upper: Chain::new(upper.len(), upper.iter().map(inwards))?,
+            lower: Chain::new(lower.len() + 1, core::iter::once(first).chain(lower.iter().rev()).map(inwards))?,
+        })
+    }
+
+    /// Whether all of the fence is within a hull.
+    pub(super) fn is_within(&self, hull: &[Key], outline: Outline) -> bool {
+        let (Some([first, ..]), Some(upper), Some(lower)) =
+            (hull.get(..outline.vertices), hull.get(..=outline.turn), hull.get(outline.turn..outline.vertices))
+        else {
+            return false;
+        };
+        let lower = core::iter::once(first).chain(lower.iter().rev());
+        self.upper.is_beside(upper.iter(), 1) && self.lower.is_beside(lower, -1)
+    }
+}
+
+impl Chain {
+    /// Of ascending corners as many as there is room for, the first and the last among them.
+    fn new(count: usize, corners: impl Iterator<Item = Key>) -> Option<Self> {
+        let mut chain = Self { corners: [Key::NONE; CORNERS], count: 0 };
+        let step = count / CORNERS + 1;
+        let mut latest = None;
+        for (number, corner) in corners.enumerate() {
+            let is_last = number + 1 == count;
+            if !is_last && number % step != 0 {
+                continue;
+            }
+            if latest.is_some_and(|latest: Key| latest.x() == corner.x()) {
+                // The last one takes the place of the one above or below it; others are left out.
+                if !is_last {
+                    continue;
+                }
+                chain.count = chain.count.checked_sub(1).filter(|&count| count > 0)?;
+            }
+            *chain.corners.get_mut(chain.count)? = corner;
+            chain.count += 1;
+            latest = Some(corner);
+        }
+        (chain.count >= 2).then_some(chain)
+    }
+
+    /// Whether every corner lies, in x, properly between the ends of a chain of a hull, and on the right of it
+    /// (`side` 1) or on the left (−1), or on it.
+    fn is_beside<'a>(&self, mut hull: impl Iterator<Item = &'a Key>, side: i64) -> bool {
+        let (Some(mut from), Some(mut to)) = (hull.next(), hull.next()) else { return false };
+        for corner in self.corners.iter().take(self.count) {
+            while to.x() < corner.x() {
+                let Some(next) = hull.next() else { return false };
+                (from, to) = (to, next);
+            }
+            if from.x() >= corner.x() || Line::through(*from, *to).side(*corner) * side < 0 {
+                return false;
+            }
+        }
+        true
+    }
+
+    fn ends(&self) -> Option<[i64; 2]> {
+        Some([self.corners.first()?.x(), self.corners.get(self.count.checked_sub(1)?)?.x()])
+    }
+}
+
+/// Walks along a chain from its right end to its left.
+struct Walk<'a> {
+    chain: &'a Chain,
+    /// The left corner of the edge.
+    at: usize,
+    left: i64,
+    line: Line,
+}
+
+impl<'a> Walk<'a> {
+    fn new(chain: &'a Chain) -> Option<Self> {
+        let mut walk =
+            Self { chain, at: chain.count.checked_sub(1)?, left: 0, line: Line::through(Key::NONE, Key::NONE) };
+        walk.advance();
+        Some(walk)
+    }
+
+    /// To the next edge on the left; at the left end nothing happens, and `left` is out of reach.
+    fn advance(&mut self) {
+        let Some(at) = self.at.checked_sub(1) else {
+            self.left = i64::MIN;
+            return;
+        };
+        if let Some(&[from, to]) = self.chain.corners.get(at..at + 2) {
+            (self.at, self.left, self.line) = (at, from.x(), Line::through(from, to));
+        }
+    }
+
+    #[inline(always)]
+    fn side(&mut self, key: Key) -> i64 {
+        while key.x() < self.left {
+            self.advance();
+        }
+        self.line.side(key)
+    }
+}
+
+/// Points of which some, the parked ones, are known to be no vertices: `keys[..active]` are at work, `keys[parked..]` are
+/// parked; both are sorted, and what is between is free.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Parking {
+    pub(super) active: usize,
+    pub(super) parked: usize,
+}
+
+impl Parking {
+    /// Puts back to work what is parked outside the fence; without a fence all. `scratch` needs room for those.
+    pub(super) fn release(&mut self, keys: &mut [Key], scratch: &mut [Key], fence: Option<&Fence>) {
+        let (start, end) = (self.parked, keys.len());
+        let released = fence.and_then(|fence| self.sift(keys, scratch, fence));
+        let released = released.unwrap_or_else(|| {
+            let parked = keys.get(start..).unwrap_or(&[]);
+            for (place, &key) in scratch.iter_mut().zip(parked.iter().rev()) {
+                *place = key;
+            }
+            self.parked = end;
+            end - start
+        });
+        // From the right end, so that nothing is overwritten before it has moved.
+        let (mut left, mut place) = (self.active, self.active + released);
+        self.active = place;
+        for &key in scratch.iter().take(released) {
+            while let Some(before) = left.checked_sub(1)
+                && let Some(&other) = keys.get(before)
+                && other > key
+            {
+                place -= 1;
+                left = before;
+                if let Some(place) = keys.get_mut(place) {
+                    *place = other;
+                }
+            }
+            place -= 1;
+            if let Some(place) = keys.get_mut(place) {
+                *place = key;
+            }
+        }
+    }
+
+    /// Moves what is parked within the fence to the end, the others to `scratch`, the greatest first; their number.
+    fn sift(&mut self, keys: &mut [Key], scratch: &mut [Key], fence: &Fence) -> Option<usize> {
+        let [left, right] = fence.upper.ends()?;
+        let (mut upper, mut lower) = (Walk::new(&fence.upper)?, Walk::new(&fence.lower)?);
+        let (mut parked, mut released) = (keys.len(), 0);
+        for at in (self.parked..keys.len()).rev() {
+            let Some(&key) = keys.get(at) else { break };
+            let stays = (upper.side(key) >= 0) & (lower.side(key) <= 0) & (left <= key.x()) & (key.x() <= right);
+            if let Some(place) = keys.get_mut(parked - 1) {
+                *place = key;
+            }
+            parked -= usize::from(stays);
+            if let Some(place) = scratch.get_mut(released) {
+                *place = key;
+            }
+            released += usize::from(!stays);
+        }
+        self.parked = parked;
+        Some(released)
+    }
+}
