@@ -17,7 +17,7 @@
 //!
 //! Foundations: [`math`] (the only caller of `libm`), [`point`] (frames of reference), [`profile`], [`kernel`] (the inner
 //! loops, which a caller may compile for wider instructions), [`transform`] and [`linear`]. [`capacity`] sizes it all for
-//! a small device. [`mesh`] makes many corresponding points of few.
+//! a small device. [`mesh`] makes many corresponding points of few, [`family`] is the geometry of views.
 //!
 //! A frame against a table in memory or flash:
 //!
@@ -69,6 +69,7 @@ mod model;
 pub mod linear;
 pub mod transform;
 pub mod mesh;
+pub mod family;
 
 pub mod image;
 pub mod tone;
