@@ -244,11 +244,27 @@ proptest! {
         })?;
     }
 
-    /// Corners that mean nothing give a mesh that obeys its rules, or an error; never a panic.
+    /// Whatever is done to a mesh, it obeys its rules or is refused; never a panic.
     #[test]
-    fn any_triangles_are_checked(
-        triangles in prop::collection::vec([0_u16..7, 0..7, 0..7], 0..9), vertices in 0_usize..8, level in levels(3),
+    fn damaged_meshes_are_told_from_sound_ones(
+        shape in shapes(), damage in prop::collection::vec((any::<u8>(), any::<u64>()), 0..3), level in levels(3),
     ) {
+        let (mut triangles, vertices) = (shape.triangles, shape.points.len());
+        for (kind, seed) in damage {
+            let mut number = numbers(seed);
+            let place = number(triangles.len() as u64) as usize;
+            let vertex = number(vertices as u64 + 1) as u16;
+            let triangle = &mut triangles[place];
+            match kind % 6 {
+                0 => triangle[number(3) as usize] = vertex,
+                1 => triangle.swap(0, 1),
+                2 => triangle.rotate_left(1),
+                3 => drop(triangles.swap_remove(place)),
+                4 => { let again = *triangle; triangles.push(again) }
+                _ => { let [a, b, _] = *triangle; triangles.push([b, a, vertex]) }
+            }
+            if triangles.is_empty() { break; }
+        }
         let mut storage = vec![0; storage_words(vertices, triangles.len())];
         let mut directed = HashMap::<_, u32>::new();
         for [a, b, c] in triangles.iter().copied() {
@@ -374,6 +390,11 @@ fn flat_triangles_are_refused_exactly() {
     assert_eq!(mesh.check_areas(&points([far, far])), Ok(()));
     let flat = MeshError::CollinearTriangle { triangle: 1, vertices: [2, 1, 3] };
     assert_eq!(mesh.check_areas(&points([far, -far])), Err(flat));
+    // One part in 2^31 from a line.
+    let near = |x: i32| [[0, 0], [(1 << 30) - 1, 3], [x, 6], [5, 9]].map(|[x, y]| ImagePoint::new(x, y));
+    assert_eq!(mesh.check_areas(&near(far - 2)), Ok(()));
+    let exactly = MeshError::CollinearTriangle { triangle: 0, vertices: [0, 1, 2] };
+    assert_eq!(mesh.check_areas(&near(far - 1)), Err(exactly));
     let line = [[0, 0], [3, 7], [0, 9], [6, -5]].map(|[x, y]| ImagePoint::new(x, y));
     assert_eq!(mesh.check_areas(&line), Ok(()));
     let line = [[0, 0], [3, 7], [0, 9], [6, 5]].map(|[x, y]| ImagePoint::new(x, y));

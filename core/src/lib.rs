@@ -19,7 +19,8 @@
 //! loops, which a caller may compile for wider instructions), [`transform`], [`linear`] and [`geometry`] (hulls and
 //! orientation, exact). [`capacity`] sizes it all for a small device.
 //! loops, which a caller may compile for wider instructions), [`transform`] and [`linear`]. [`capacity`] sizes it all for
-//! a small device. [`mesh`] makes many corresponding points of few.
+//! a small device. [`mesh`] makes many corresponding points of few, [`family`] and [`camera`] are the geometry of
+//! views.
 //!
 //! A frame against a table in memory or flash:
 //!
@@ -72,6 +73,8 @@ pub mod linear;
 pub mod transform;
 pub mod geometry;
 pub mod mesh;
+pub mod family;
+pub mod camera;
 
 pub mod image;
 pub mod tone;

@@ -5,7 +5,7 @@
 
 use super::error::MeshError;
 
-/// The directed edge and the vertex opposite to it; `None` if there is no such half-edge.
+/// The directed edge and the vertex opposite to it.
 #[derive(Clone, Copy)]
 struct HalfEdge {
     from: u16,
@@ -14,6 +14,7 @@ struct HalfEdge {
 }
 
 impl HalfEdge {
+    /// `None` if there is no such triangle.
     #[inline]
     fn of(triangles: &[[u16; 3]], number: u32) -> Option<Self> {
         let &[a, b, c] = triangles.get(number as usize / 3)?;
@@ -25,17 +26,26 @@ impl HalfEdge {
         Some(Self { from, to, opposite })
     }
 
+    #[inline]
     fn low(self) -> u16 {
         self.from.min(self.to)
     }
 
+    #[inline]
     fn high(self) -> u16 {
         self.from.max(self.to)
     }
 
-    fn ends(self) -> [u16; 2] {
-        [self.low(), self.high()]
+    /// Both ends in one word, ordered like the ends: the lower vertex in the higher half.
+    #[inline]
+    fn ends(self) -> u32 {
+        u32::from(self.low()) << 16 | u32::from(self.high())
     }
+}
+
+/// Lower and higher vertex.
+pub(super) fn unpacked(ends: u32) -> [u16; 2] {
+    [(ends >> 16) as u16, ends as u16]
 }
 
 /// What [`build`] fills in. Lengths: `3 T`, `3 T`, at least `3 T` and `V`, `V`.
@@ -53,55 +63,98 @@ pub(super) struct Tables<'a> {
 /// Marks a vertex that no triangle has.
 pub(super) const NO_CORNER: u32 = u32::MAX;
 
-/// Both ends of an edge in one word, ordered like the ends.
-pub(super) fn packed([low, high]: [u16; 2]) -> u32 {
-    u32::from(low) << 16 | u32::from(high)
-}
-
 /// Numbers the edges and checks them; the number of edges.
 pub(super) fn build(triangles: &[[u16; 3]], vertices: u32, tables: &mut Tables<'_>) -> Result<usize, MeshError> {
+    let Tables { first_half_edge: sorted, edges, edge_of, first_corner } = tables;
     check_corners(triangles, vertices)?;
-    let half_edges = 3 * triangles.len() as u32;
-    // Until the walk: `edges` holds the half-edges by higher vertex, `edge_of` the counts of a sort.
-    let counts = tables.edge_of.get_mut(..vertices as usize).unwrap_or_default();
-    let sorted = &mut *tables.first_half_edge;
-    counting_sort(triangles, 0..half_edges, counts, tables.edges, HalfEdge::high);
-    counting_sort(triangles, tables.edges.iter().copied(), counts, sorted, HalfEdge::low);
-
-    tables.first_corner.fill(NO_CORNER);
-    for (corner, &vertex) in triangles.as_flattened().iter().enumerate().rev() {
-        if let Some(first) = tables.first_corner.get_mut(usize::from(vertex)) {
-            *first = corner as u32;
+    // Until the walk: `edges` holds the half-edges by higher vertex, `edge_of` and `first_corner` where those of a higher
+    // and of a lower vertex go.
+    let (by_high, by_low) = (edge_of.get_mut(..vertices as usize).unwrap_or_default(), &mut **first_corner);
+    count(triangles, by_high, by_low);
+    let halves = triangles.iter().flat_map(|&[a, b, c]| [a.max(b), b.max(c), c.max(a)]);
+    for (number, high) in (0..).zip(halves) {
+        place(number, by_high, high, edges);
+    }
+    for &mut number in &mut **edges {
+        if let Some(half) = HalfEdge::of(triangles, number) {
+            place(number, by_low, half.low(), sorted);
         }
     }
+    name_first_corners(triangles, first_corner);
 
-    let (mut at, mut edge) = (0, 0);
-    while let Some(&first) = sorted.get(at) {
-        let Some(half) = HalfEdge::of(triangles, first) else { break };
-        let shared = |number: &u32| HalfEdge::of(triangles, *number).is_some_and(|other| other.ends() == half.ends());
-        let second = sorted.get(at + 1).copied().filter(shared);
-        if let Some(second) = second {
-            let third = sorted.get(at + 2).copied().filter(shared);
-            check_neighbours(triangles, first, second, third)?;
-            if third.is_some() {
-                let users = sorted.iter().skip(at).take_while(|number| shared(number)).count();
-                return Err(MeshError::NonManifoldEdge { ends: half.ends(), triangles: users as u32 });
+    let mut edge = 0;
+    let mut at = 0;
+    let half_at = |sorted: &[u32], at: usize| {
+        let &number = sorted.get(at)?;
+        Some((number, HalfEdge::of(triangles, number)?))
+    };
+    let mut next = half_at(sorted, 0);
+    while let Some((first, half)) = next {
+        let shared = |other: &(u32, HalfEdge)| other.1.ends() == half.ends();
+        at += 1;
+        next = half_at(sorted, at);
+        if let Some(second) = next.filter(shared) {
+            at += 1;
+            next = half_at(sorted, at);
+            check_neighbours((first, half), second, next.filter(shared))?;
+            if next.is_some_and(|third| shared(&third)) {
+                let further = (at..).map_while(|at| half_at(sorted, at)).take_while(shared).count();
+                let triangles = 2 + further as u32;
+                return Err(MeshError::NonManifoldEdge { ends: unpacked(half.ends()), triangles });
             }
+            write(edge_of, second.0 as usize, edge);
         }
-        for number in [Some(first), second].into_iter().flatten() {
-            if let Some(slot) = tables.edge_of.get_mut(number as usize) {
-                *slot = edge as u32;
-            }
-        }
-        // `edge <= at`: what is overwritten has been read.
-        if let (Some(slot), Some(ends)) = (sorted.get_mut(edge), tables.edges.get_mut(edge)) {
-            *slot = first;
-            *ends = packed(half.ends());
-        }
-        at += 1 + usize::from(second.is_some());
+        write(edge_of, first as usize, edge);
+        // At most `at` edges are known: what is overwritten has been read.
+        write(sorted, edge as usize, first);
+        write(edges, edge as usize, half.ends());
         edge += 1;
     }
-    Ok(edge)
+    Ok(edge as usize)
+}
+
+#[inline]
+fn write(words: &mut [u32], at: usize, word: u32) {
+    if let Some(slot) = words.get_mut(at) {
+        *slot = word;
+    }
+}
+
+/// Where the half-edges of each higher and each lower vertex begin, once they are sorted.
+fn count(triangles: &[[u16; 3]], by_high: &mut [u32], by_low: &mut [u32]) {
+    by_high.fill(0);
+    by_low.fill(0);
+    for &[a, b, c] in triangles {
+        for (from, to) in [(a, b), (b, c), (c, a)] {
+            if let (Some(high), Some(low)) =
+                (by_high.get_mut(usize::from(from.max(to))), by_low.get_mut(usize::from(from.min(to))))
+            {
+                *high += 1;
+                *low += 1;
+            }
+        }
+    }
+    let (mut high_sum, mut low_sum) = (0, 0);
+    for (high, low) in by_high.iter_mut().zip(by_low) {
+        (*high, high_sum) = (high_sum, high_sum + *high);
+        (*low, low_sum) = (low_sum, low_sum + *low);
+    }
+}
+
+/// Writes a half-edge behind those of the same vertex.
+#[inline]
+fn place(number: u32, begins: &mut [u32], vertex: u16, sorted: &mut [u32]) {
+    if let Some(at) = begins.get_mut(usize::from(vertex)) {
+        write(sorted, *at as usize, number);
+        *at += 1;
+    }
+}
+
+fn name_first_corners(triangles: &[[u16; 3]], first_corner: &mut [u32]) {
+    first_corner.fill(NO_CORNER);
+    for (corner, &vertex) in triangles.as_flattened().iter().enumerate().rev() {
+        write(first_corner, usize::from(vertex), corner as u32);
+    }
 }
 
 fn check_corners(triangles: &[[u16; 3]], vertices: u32) -> Result<(), MeshError> {
@@ -117,49 +170,22 @@ fn check_corners(triangles: &[[u16; 3]], vertices: u32) -> Result<(), MeshError>
     Ok(())
 }
 
-/// Writes the half-edges to `sorted`, stably ordered by a vertex. `counts` has a word for each vertex.
-fn counting_sort(
-    triangles: &[[u16; 3]],
-    half_edges: impl Iterator<Item = u32> + Clone,
-    counts: &mut [u32],
-    sorted: &mut [u32],
-    key: fn(HalfEdge) -> u16,
-) {
-    counts.fill(0);
-    let keyed = half_edges.filter_map(|number| Some((number, usize::from(key(HalfEdge::of(triangles, number)?)))));
-    for (_, vertex) in keyed.clone() {
-        if let Some(count) = counts.get_mut(vertex) {
-            *count += 1;
-        }
-    }
-    let mut sum = 0;
-    for count in &mut *counts {
-        (*count, sum) = (sum, sum + *count);
-    }
-    for (number, vertex) in keyed {
-        if let Some(place) = counts.get_mut(vertex) {
-            if let Some(slot) = sorted.get_mut(*place as usize) {
-                *slot = number;
-            }
-            *place += 1;
-        }
-    }
-}
-
 /// Refuses doubled triangles and, of two neighbours, a directed edge that both have.
-fn check_neighbours(triangles: &[[u16; 3]], first: u32, second: u32, third: Option<u32>) -> Result<(), MeshError> {
-    let half = |number: u32| HalfEdge::of(triangles, number);
+#[inline]
+fn check_neighbours(
+    first: (u32, HalfEdge),
+    second: (u32, HalfEdge),
+    third: Option<(u32, HalfEdge)>,
+) -> Result<(), MeshError> {
     for (one, other) in [(first, Some(second)), (first, third), (second, third)] {
-        let Some(other) = other else { continue };
-        if half(one).map(|half| half.opposite) == half(other).map(|half| half.opposite) {
-            return Err(MeshError::DoubledTriangle { triangles: [one / 3, other / 3] });
+        if let Some(other) = other.filter(|other| other.1.opposite == one.1.opposite) {
+            return Err(MeshError::DoubledTriangle { triangles: [one.0 / 3, other.0 / 3] });
         }
     }
-    match (half(first), half(second)) {
-        (Some(one), Some(other)) if third.is_none() && one.from == other.from => {
-            let triangles = [first / 3, second / 3];
-            Err(MeshError::InconsistentOrientation { directed: [one.from, one.to], triangles })
-        }
-        _ => Ok(()),
+    let (one, other) = (first.1, second.1);
+    if third.is_none() && one.from == other.from {
+        let triangles = [first.0 / 3, second.0 / 3];
+        return Err(MeshError::InconsistentOrientation { directed: [one.from, one.to], triangles });
     }
+    Ok(())
 }

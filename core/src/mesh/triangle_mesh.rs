@@ -115,12 +115,12 @@ impl<'a> TriangleMesh<'a> {
 
     /// The edges by number: lower and higher vertex, in ascending order.
     pub fn edges(&self) -> impl ExactSizeIterator<Item = [u16; 2]> + Clone + use<'a> {
-        self.edges.iter().map(|&ends| unpacked(ends))
+        self.edges.iter().map(|&ends| build::unpacked(ends))
     }
 
     /// Lower and higher vertex of an edge.
     pub fn edge(&self, edge: u32) -> Option<[u16; 2]> {
-        self.edges.get(edge as usize).map(|&ends| unpacked(ends))
+        self.edges.get(edge as usize).map(|&ends| build::unpacked(ends))
     }
 
     /// The edges of a triangle: from its first corner to the second, the second to the third, the third to the first.
@@ -140,8 +140,4 @@ impl<'a> TriangleMesh<'a> {
             .filter(|&&corner| corner != build::NO_CORNER)
             .map(|corner| (corner / 3, corner % 3))
     }
-}
-
-fn unpacked(ends: u32) -> [u16; 2] {
-    [(ends >> 16) as u16, ends as u16]
 }

@@ -1,0 +1,6 @@
+//! How a camera sees points of space.
+//!
+//! **Camera frame.** The origin is the centre of projection, x points right, y down as in the image, z along the optical axis
+//! into the scene. Lengths in metres, image coordinates in pixels from the principal point.
+
+pub mod weak_perspective;
