@@ -7,10 +7,10 @@
 
 use heapless::Vec;
 
-use super::proposal::{Pairing, Proposal};
+use super::proposal::{Invariance, Pairing, Proposal, Terms};
 use crate::math::{log2, sqrt};
 use crate::point::ImagePoint;
-use crate::transform::{Affine, WeightedPair, fit_affine};
+use crate::transform::{Affine, Homography, Normalization, WeightedPair, fit_affine, fit_homography};
 
 /// No corner.
 const NONE: u16 = u16::MAX;
@@ -24,6 +24,8 @@ const ROUNDS: usize = 4;
 const NOISE_LEVELS: [f32; 3] = [1.0, 2.0, 3.0];
 /// Bits by which the best map must exceed the number of maps that could have been tried.
 const LEAST_BITS: f32 = 20.0;
+/// Ridge on the perspective terms, in normalized coordinates.
+const PERSPECTIVE_RIDGE: f64 = 1e-4;
 /// A different map with more than this share of the best one's bits leaves the answer open.
 const RIVAL: f32 = 0.6;
 
@@ -85,7 +87,7 @@ pub struct Explained {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BestMap {
     /// The map.
-    pub second_from_first: Affine,
+    pub second_from_first: Homography,
     /// Bits beyond chance, the choice among all possible maps already taken off.
     pub bits: f32,
     /// Bits of the best different map, likewise; 0 if none was better than nothing.
@@ -143,8 +145,8 @@ impl<const POINTS: usize> Agreement<POINTS> {
         }
     }
 
-    /// Finds the map that explains most corners, starting from the proposals. `sigma` is the expected noise of a coordinate,
-    /// px. Corners beyond `POINTS` are not looked at. [`Self::explained`] then lists the correspondences.
+    /// Finds the map that explains most corners, starting from the proposals: affine, and then perspective if the terms ask
+    /// for it and it explains more. Corners beyond `POINTS` are not looked at. [`Self::explained`] then lists the correspondences.
     ///
     /// # Errors
     /// [`NoAgreement`]: not a fault, but the reason why there is no answer.
@@ -153,7 +155,7 @@ impl<const POINTS: usize> Agreement<POINTS> {
         first: &[ImagePoint],
         second: &[ImagePoint],
         proposals: impl Iterator<Item = &'a Proposal>,
-        sigma: f32,
+        terms: Terms,
     ) -> Result<BestMap, NoAgreement> {
         self.enter(first, second);
         let trials = tested_maps(self.first.len(), self.second.len());
@@ -164,7 +166,7 @@ impl<const POINTS: usize> Agreement<POINTS> {
             if proposal.pairs.iter().all(known) {
                 continue;
             }
-            let Some((fit, bits)) = self.follow(proposal, sigma) else { continue };
+            let Some((fit, bits)) = self.follow(proposal, terms.sigma) else { continue };
             let matched = self.matched.iter().filter(|m| m.0 != NONE).count();
             let shared = self.best.iter().zip(&self.matched).filter(|(a, b)| a.0 == b.0 && a.0 != NONE).count();
             let different = shared * 2 < matched;
@@ -187,8 +189,10 @@ impl<const POINTS: usize> Agreement<POINTS> {
         if rival_bits > RIVAL * bits {
             return Err(NoAgreement::Ambiguous { bits, rival_bits });
         }
-        let (fit, bits, sigma) = self.settle(fit, sigma);
-        Ok(BestMap { second_from_first: fit.map, bits: bits - trials, rival_bits, sigma })
+        let (fit, bits, sigma) = self.settle(fit, terms.sigma);
+        let affine = BestMap { second_from_first: fit.map.into(), bits: bits - trials, rival_bits, sigma };
+        let perspective = terms.invariance == Invariance::Perspective;
+        Ok(if perspective { self.tilt(affine, &fit, trials) } else { affine })
     }
 
     /// The correspondences of the map found last, in the order of the first corners.
@@ -252,6 +256,30 @@ impl<const POINTS: usize> Agreement<POINTS> {
         best
     }
 
+    /// The homography of what the affine map explains and what it explains in turn, if that is more. It has a fourth
+    /// pair free, which costs as many bits as there are pairs.
+    fn tilt(&mut self, affine: BestMap, fit: &Fit, trials: f32) -> BestMap {
+        let free = log2((self.first.len() * self.second.len()).max(1) as f64) as f32;
+        let [source, target] = [&self.first, &self.second].map(|places| {
+            let side = places.iter().flatten().fold(1.0_f32, |most, &x| if x > most { x } else { most });
+            Normalization::of_frame(side as u16, side as u16)
+        });
+        let mut best = affine;
+        self.matched.clone_from(&self.best);
+        for _ in 0..ROUNDS {
+            if self.refit().is_none() {
+                break;
+            }
+            let Some(map) = fit_homography(&self.pairs, source, target, PERSPECTIVE_RIDGE) else { break };
+            let bits = self.pair_up(|point| (map.apply(point), fit.variance(point)), best.sigma) - trials - free;
+            if bits > best.bits {
+                best = BestMap { second_from_first: map, bits, ..best };
+                self.best.clone_from(&self.matched);
+            }
+        }
+        best
+    }
+
     fn refit(&mut self) -> Option<Fit> {
         self.pairs.clear();
         for (&from, &(second, _)) in self.first.iter().zip(&self.matched) {
@@ -265,6 +293,11 @@ impl<const POINTS: usize> Agreement<POINTS> {
     /// Pairs every first corner with the nearest second one within the gate, one to one; gives the bits. A corner with two
     /// about equally near ones is left out: they decide nothing.
     fn assign(&mut self, fit: &Fit, sigma: f32) -> f32 {
+        self.pair_up(|point| (fit.map.apply(point), fit.variance(point)), sigma)
+    }
+
+    /// [`Self::assign`] for any map: where it takes a point, and the variance there for corners of variance 1.
+    fn pair_up(&mut self, map: impl Fn([f32; 2]) -> ([f32; 2], f32), sigma: f32) -> f32 {
         self.matched.clear();
         self.taken.clear();
         for _ in &self.second {
@@ -272,10 +305,11 @@ impl<const POINTS: usize> Agreement<POINTS> {
         }
         let mut gates = 0.0;
         for (number, &point) in (0_u16..).zip(&self.first) {
-            let gate = GATE * sigma * sigma * fit.variance(point);
+            let (expected, variance) = map(point);
+            let gate = GATE * sigma * sigma * variance;
             let gate = if gate < WIDEST_GATE { gate } else { WIDEST_GATE };
             gates += gate;
-            let (nearest, second) = nearest_two(&self.second, fit.map.apply(point));
+            let (nearest, second) = nearest_two(&self.second, expected);
             let clear = nearest.1 <= gate && (second > gate || second > 4.0 * nearest.1);
             let _ = self.matched.push(if clear { nearest } else { (NONE, 0.0) });
             if clear

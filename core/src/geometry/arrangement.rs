@@ -8,8 +8,9 @@
 
 use heapless::Vec;
 
-use super::proposal::{Origin, Pairing, Proposal};
-use super::quad::{Deviation, Quad};
+use super::cross_ratio::FivePoints;
+use super::proposal::{Invariance, Origin, Pairing, Proposal, Terms};
+use super::quad::Quad;
 use crate::math::log2;
 use crate::point::ImagePoint;
 
@@ -23,8 +24,6 @@ pub const STARTS: usize = 4;
 const MOST_UNCERTAIN: f64 = 0.2;
 /// Standard deviations that two invariants may differ by.
 const GATE_SIGMAS: f64 = 3.0;
-/// Squared Mahalanobis distance of two degrees of freedom that 99 % of the true quads keep.
-const GATE: f64 = 9.21;
 
 /// A corner and four of its neighbours, clockwise as seen.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -124,39 +123,42 @@ fn places(points: &[ImagePoint], corners: [u16; 5]) -> [ImagePoint; 5] {
 }
 
 /// The arrangement with its key, unless its first triangles are too thin to say anything.
-fn describe(points: &[ImagePoint], corners: [u16; 5], sigma: f32) -> Option<Arrangement> {
-    let [centre, a, b, c, _] = places(points, corners);
-    // Triangles (a, b, centre) and (b, centre, c): two of those around the corner.
-    let quad = Quad::new([a, b, centre, c]);
-    let spread = quad.ratio_uncertainty(sigma);
-    if !(spread <= MOST_UNCERTAIN) {
-        return None;
-    }
-    let ratio = quad.ratio();
-    let key = log2((ratio.upper as f64 / ratio.lower as f64).abs()) as f32;
-    // In bits, as the key.
-    Some(Arrangement { key, spread: (spread * core::f64::consts::LOG2_E) as f32, corners })
+fn describe(points: &[ImagePoint], corners: [u16; 5], terms: Terms) -> Option<Arrangement> {
+    let [centre, a, b, c, d] = places(points, corners);
+    let (key, spread) = match terms.invariance {
+        Invariance::Affine => {
+            // Triangles (a, b, centre) and (b, centre, c): two of those around the corner.
+            let quad = Quad::new([a, b, centre, c]);
+            let ratio = quad.ratio();
+            (log2((ratio.upper as f64 / ratio.lower as f64).abs()), quad.ratio_uncertainty(terms.sigma))
+        }
+        Invariance::Perspective => {
+            let five = FivePoints::new([centre, a, b, c, d])?;
+            (five.key() * core::f64::consts::LOG2_E, five.key_uncertainty(terms.sigma))
+        }
+    };
+    // The key is in bits, and so is its spread.
+    let entry = Arrangement { key: key as f32, spread: (spread * core::f64::consts::LOG2_E) as f32, corners };
+    (spread <= MOST_UNCERTAIN).then_some(entry)
 }
 
-/// Finds arrangements of the first points that an affine map could have taken to arrangements of the second.
+/// Finds arrangements of the first points that a map could have taken to arrangements of the second.
 ///
-/// `sigma` is the noise of each coordinate in px. `scratch` holds the arrangements of the second points: give it
-/// [`scratch_length`]; with less, the last corners have none. `area` is the area in px² of the second picture in which
-/// corners may lie. Each proposal has five pairs, its corner first. Mirror images are refused.
+/// `scratch` holds the arrangements of the second points: give it [`scratch_length`]; with less, the last corners have
+/// none. Each proposal has five pairs, its corner first. Mirror images are refused.
 ///
 /// Cost: `O(n²)` for the neighbours, then a sort of `60 n` entries and `15 n` lookups.
 pub fn propose(
     first: &[ImagePoint],
     second: &[ImagePoint],
-    sigma: f32,
-    area: f64,
+    terms: Terms,
     scratch: &mut [Arrangement],
     mut found: impl FnMut(Proposal),
 ) {
     let mut count = 0;
     each(second, |[centre, a, b, c, d]| {
         for corners in [[centre, a, b, c, d], [centre, b, c, d, a], [centre, c, d, a, b], [centre, d, a, b, c]] {
-            if let Some(arrangement) = describe(second, corners, sigma)
+            if let Some(arrangement) = describe(second, corners, terms)
                 && let Some(place) = scratch.get_mut(count)
             {
                 *place = arrangement;
@@ -168,7 +170,7 @@ pub fn propose(
     super::heap_sort::sort_by(entries, |a, b| a.key.total_cmp(&b.key).then_with(|| a.corners.cmp(&b.corners)).is_lt());
     let widest = entries.iter().fold(0.0_f32, |most, entry| if entry.spread > most { entry.spread } else { most });
     each(first, |corners| {
-        let Some(wanted) = describe(first, corners, sigma) else { return };
+        let Some(wanted) = describe(first, corners, terms) else { return };
         let reach =
             |spread: f32| GATE_SIGMAS as f32 * crate::math::sqrt(wanted.spread * wanted.spread + spread * spread);
         let from = entries.partition_point(|entry| entry.key < wanted.key - reach(widest));
@@ -177,7 +179,7 @@ pub fn propose(
                 break;
             }
             if (entry.key - wanted.key).abs() <= reach(entry.spread)
-                && let Some(surprise) = compare(places(first, corners), places(second, entry.corners), sigma, area)
+                && let Some(surprise) = compare(places(first, corners), places(second, entry.corners), terms)
             {
                 let pairs = corners.iter().zip(&entry.corners);
                 let pairs = pairs.map(|(&first, &second)| Pairing { first, second });
@@ -191,17 +193,15 @@ pub fn propose(
     });
 }
 
-/// How surprising it is that five points agree up to an affine map, in 1/256 bit; `None` if they do not.
-fn compare(p: [ImagePoint; 5], q: [ImagePoint; 5], sigma: f32, area: f64) -> Option<i32> {
+/// How surprising it is that five points agree up to a map, in 1/256 bit; `None` if they do not.
+fn compare(p: [ImagePoint; 5], q: [ImagePoint; 5], terms: Terms) -> Option<i32> {
     let ([p0, p1, p2, p3, p4], [q0, q1, q2, q3, q4]) = (p, q);
-    let one = agree(Quad::new([p0, p1, p2, p3]), Quad::new([q0, q1, q2, q3]), sigma)?;
-    let two = agree(Quad::new([p0, p2, p3, p4]), Quad::new([q0, q2, q3, q4]), sigma)?;
-    let bits = [one, two].into_iter().fold(0.0, |sum, ellipse| sum + log2(area / ellipse));
+    let bits = match terms.invariance {
+        Invariance::Affine => {
+            let one = terms.affine_bits(Quad::new([p0, p1, p2, p3]), Quad::new([q0, q1, q2, q3]))?;
+            one + terms.affine_bits(Quad::new([p0, p2, p3, p4]), Quad::new([q0, q2, q3, q4]))?
+        }
+        Invariance::Perspective => terms.perspective_bits(p, q)?,
+    };
     Some((bits * 256.0) as i32)
-}
-
-/// The area in which the fourth point was expected, if the quads agree.
-fn agree(p: Quad, q: Quad, sigma: f32) -> Option<f64> {
-    let Deviation { squared, ellipse } = p.deviation(&q, sigma)?;
-    (squared <= GATE).then_some(ellipse * GATE)
 }

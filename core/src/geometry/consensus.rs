@@ -8,8 +8,8 @@
 
 use heapless::Vec;
 
-use super::proposal::{MOST_PAIRS, Pairing, Proposal};
 use super::heap_sort::sort_by;
+use super::proposal::{MOST_PAIRS, Pairing, Proposal};
 
 /// Rounds of choosing; later ones change hardly anything.
 const ROUNDS: usize = 6;

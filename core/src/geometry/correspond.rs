@@ -8,10 +8,10 @@ use super::arrangement::{self, Arrangement};
 use super::consensus::{Consensus, Supported};
 use super::epipolar::{AffineEpipolar, JointPoint};
 use super::error::GeometryError;
-use super::layers::HullLayers;
-use super::proposal::{Pairing, Proposals};
-use super::shift::{self, LayerQuad};
 use super::heap_sort::sort_by;
+use super::layers::HullLayers;
+use super::proposal::{Invariance, Pairing, Proposals, Terms};
+use super::shift::{self, LayerQuad};
 use crate::point::ImagePoint;
 
 /// Bits that a pair needs from its neighbours.
@@ -57,18 +57,17 @@ pub enum Sources {
 /// What is known beforehand.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
-    /// Standard deviation of the noise of each coordinate of a corner, px.
-    pub sigma: f32,
-    /// Area of the second picture in which corners may lie, px².
-    pub area: f64,
+    /// Noise of the corners, the second picture's area, and what two views keep.
+    pub terms: Terms,
     /// Where proposals come from.
     pub sources: Sources,
 }
 
 impl Settings {
-    /// Corners of half a pixel of noise in a picture of this size, from both sources.
+    /// Corners of half a pixel of noise in a picture of this size, affine invariants from both sources.
     pub fn of_picture(width: u32, height: u32) -> Self {
-        Self { sigma: 0.5, area: f64::from(width) * f64::from(height), sources: Sources::Both }
+        let area = f64::from(width) * f64::from(height);
+        Self { terms: Terms { sigma: 0.5, area, invariance: Invariance::Affine }, sources: Sources::Both }
     }
 }
 
@@ -209,16 +208,16 @@ impl<const POINTS: usize, const LAYERS: usize, const PROPOSALS: usize, const CAN
         from_arrangements.clear();
         first_layers.peel(first)?;
         second_layers.peel(second)?;
-        let Settings { sigma, area, sources } = settings;
+        let Settings { terms, sources } = settings;
         if sources != Sources::Arrangements {
             for (i, one) in (0_u8..).zip(first_layers.layers()) {
                 for (j, two) in (0_u8..).zip(second_layers.layers()).filter(|(j, _)| j.abs_diff(i) <= 1) {
-                    shift::propose((first, one, i), (second, two, j), sigma, area, quads, |p| from_layers.add(p));
+                    shift::propose((first, one, i), (second, two, j), terms, quads, |p| from_layers.add(p));
                 }
             }
         }
         if sources != Sources::Layers {
-            arrangement::propose(first, second, sigma, area, scratch, |p| from_arrangements.add(p));
+            arrangement::propose(first, second, terms, scratch, |p| from_arrangements.add(p));
         }
         Ok(())
     }
@@ -230,7 +229,7 @@ impl<const POINTS: usize, const LAYERS: usize, const PROPOSALS: usize, const CAN
         settings: Settings,
     ) -> Result<BestMap, NoAgreement> {
         let proposals = self.from_arrangements.iter().chain(self.from_layers.iter());
-        let map = self.agreement.find(first, second, proposals, settings.sigma)?;
+        let map = self.agreement.find(first, second, proposals, settings.terms)?;
         for explained in self.agreement.explained() {
             let _ = self.found.push(Correspondence { pair: explained.pair, residual: explained.residual });
         }

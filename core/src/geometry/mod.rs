@@ -7,6 +7,7 @@
 //!     └───── layers      hulls within hulls until the points are exhausted
 //!               │
 //!  quad: areas of four points, their affine invariants       sorted_areas: the thesis' first order, a baseline
+//!  cross_ratio: the perspective invariants of five
 //!               │
 //!     ┌─ shift          quads of hull vertices in cyclic order
 //!     └─ arrangement    corners with their neighbours in angular order
@@ -35,6 +36,7 @@ pub mod hull;
 pub mod layers;
 mod heap_sort;
 pub mod quad;
+pub mod cross_ratio;
 pub mod proposal;
 pub mod shift;
 pub mod arrangement;

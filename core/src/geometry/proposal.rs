@@ -6,6 +6,49 @@
 
 use heapless::Vec;
 
+use super::cross_ratio::FivePoints;
+use super::quad::Quad;
+use crate::math::log2;
+use crate::point::ImagePoint;
+
+/// Squared Mahalanobis distance of two degrees of freedom that 99 % of the true quads keep.
+const GATE: f64 = 9.21;
+
+/// What two views of the same corners are expected to keep.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Invariance {
+    /// Ratios of areas: weak perspective, corners of one plane.
+    #[default]
+    Affine,
+    /// Cross-ratios of five points: any perspective, corners of one plane.
+    Perspective,
+}
+
+/// On what terms corners are compared.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Terms {
+    /// Standard deviation of the noise of each coordinate, px.
+    pub sigma: f32,
+    /// Area of the second picture in which corners may lie, px².
+    pub area: f64,
+    /// What is kept.
+    pub invariance: Invariance,
+}
+
+impl Terms {
+    /// Bits of surprise that two quads agree up to an affine map; `None` if they do not.
+    pub(super) fn affine_bits(self, p: Quad, q: Quad) -> Option<f64> {
+        let deviation = p.deviation(&q, self.sigma)?;
+        (deviation.squared <= GATE).then(|| log2(self.area / (GATE * deviation.ellipse)))
+    }
+
+    /// Bits of surprise that five points agree up to a perspective map; `None` if they do not.
+    pub(super) fn perspective_bits(self, p: [ImagePoint; 5], q: [ImagePoint; 5]) -> Option<f64> {
+        let deviation = FivePoints::new(p)?.deviation(&FivePoints::new(q)?, self.sigma)?;
+        (deviation.squared <= GATE).then(|| deviation.bits - log2(GATE))
+    }
+}
+
 /// Corners in a proposal, at most.
 pub const MOST_PAIRS: usize = 5;
 

@@ -6,19 +6,21 @@
 
 use heapless::Vec;
 
-use super::proposal::{Origin, Pairing, Proposal};
+use super::cross_ratio::FivePoints;
+use super::proposal::{Invariance, Origin, Pairing, Proposal, Terms};
 use super::quad::{AreaRatio, Quad, Tolerance};
 use crate::math::log2;
 use crate::point::ImagePoint;
 
-/// Squared Mahalanobis distance of two degrees of freedom that 99 % of the true quads keep.
-const GATE: f64 = 9.21;
 /// A quad whose invariants are less certain than this (standard deviation of the logarithm) says little.
 const MOST_UNCERTAIN: f64 = 0.35;
 
 /// Which of the vertices `k, k+1, ...` make a quad: four in a row, or five with one left out, so that a vertex that the
 /// other view lost does not break it.
 const CHOICES: [[usize; 4]; 4] = [[0, 1, 2, 3], [0, 2, 3, 4], [0, 1, 3, 4], [0, 1, 2, 4]];
+/// The same for the five vertices that a cross-ratio needs.
+const CHOICES_OF_FIVE: [[usize; 5]; 5] =
+    [[0, 1, 2, 3, 4], [0, 2, 3, 4, 5], [0, 1, 3, 4, 5], [0, 1, 2, 4, 5], [0, 1, 2, 3, 5]];
 
 /// The best circular shift of two layers by the thesis' rule.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -31,25 +33,29 @@ pub struct Shift<const POINTS: usize> {
     pub pairs: Vec<Pairing, POINTS>,
 }
 
-/// The four vertices of a layer from `start` on that a choice names; `None` if the layer has too few.
-fn quad(points: &[ImagePoint], layer: &[u16], start: usize, choice: [usize; 4]) -> Option<([u16; 4], Quad)> {
-    if layer.len() <= choice[3] {
-        return None;
-    }
-    let vertex = |step: usize| {
+/// The vertices of a layer from `start` on that a choice names, and their places; `None` if the layer has too few.
+fn vertices<const COUNT: usize>(
+    points: &[ImagePoint],
+    layer: &[u16],
+    start: usize,
+    choice: [usize; COUNT],
+) -> Option<([u16; COUNT], [ImagePoint; COUNT])> {
+    let mut numbers = [0; COUNT];
+    let mut places = [ImagePoint::default(); COUNT];
+    for ((number, place), step) in numbers.iter_mut().zip(&mut places).zip(choice) {
+        if step >= layer.len() {
+            return None;
+        }
         let at = start + step;
-        layer.get(if at < layer.len() { at } else { at - layer.len() }).copied()
-    };
-    let [a, b, c, d] = choice.map(vertex);
-    let numbers = [a?, b?, c?, d?];
-    let place = |number: u16| points.get(usize::from(number)).copied();
-    let [a, b, c, d] = numbers.map(place);
-    Some((numbers, Quad::new([a?, b?, c?, d?])))
+        *number = *layer.get(if at < layer.len() { at } else { at - layer.len() })?;
+        *place = *points.get(usize::from(*number))?;
+    }
+    Some((numbers, places))
 }
 
 /// The thesis' I(k) of four vertices in a row.
 fn plain_ratio(points: &[ImagePoint], layer: &[u16], start: usize) -> Option<AreaRatio> {
-    quad(points, layer, start, CHOICES[0]).map(|(_, quad)| quad.ratio())
+    vertices(points, layer, start, CHOICES[0]).map(|(_, places)| Quad::new(places).ratio())
 }
 
 /// The thesis' circular shift (5.3): the shift at which most quads of consecutive vertices satisfy
@@ -102,55 +108,75 @@ pub fn plain_shift<const POINTS: usize>(
     Some(Shift { shift: best as u16, quads: quads as u16, pairs })
 }
 
-/// A quad of a layer with the ranges of its invariants.
+/// Four or five vertices of a layer with their invariants.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct LayerQuad {
-    vertices: [u16; 4],
-    /// Logarithms of `I` and `J`, and their spread (three standard deviations), in bits.
+    /// The fifth is unused where four are enough.
+    vertices: [u16; 5],
+    /// Logarithms of the invariants, in bits: `I` and `J` of four, `C1` of five.
     invariants: [f32; 2],
+    /// Three standard deviations of the first.
     spread: f32,
     start: u16,
 }
 
 /// Quads that a layer of this many vertices has, at most.
 pub const fn quads_of(vertices: usize) -> usize {
-    vertices * CHOICES.len()
+    vertices * CHOICES_OF_FIVE.len()
 }
 
-fn describe(points: &[ImagePoint], layer: &[u16], sigma: f32, mut entry: impl FnMut(LayerQuad)) {
+fn describe(
+    points: &[ImagePoint],
+    layer: &[u16],
+    sigma: f32,
+    invariance: Invariance,
+    mut entry: impl FnMut(LayerQuad),
+) {
+    let spread = |uncertainty: f64| {
+        (uncertainty <= MOST_UNCERTAIN).then_some((3.0 * core::f64::consts::LOG2_E * uncertainty) as f32)
+    };
     for start in 0..layer.len() {
-        for choice in CHOICES {
-            let Some((vertices, quad)) = quad(points, layer, start, choice) else { continue };
-            let spread = quad.ratio_uncertainty(sigma);
-            if !(spread <= MOST_UNCERTAIN) {
-                continue;
+        if invariance == Invariance::Perspective {
+            for choice in CHOICES_OF_FIVE {
+                let Some((vertices, places)) = vertices(points, layer, start, choice) else { continue };
+                if let Some(five) = FivePoints::new(places)
+                    && let Some(spread) = spread(five.key_uncertainty(sigma))
+                {
+                    let key = (five.key() * core::f64::consts::LOG2_E) as f32;
+                    entry(LayerQuad { vertices, invariants: [key, 0.0], spread, start: start as u16 });
+                }
             }
-            let log = |ratio: AreaRatio| log2((ratio.upper as f64 / ratio.lower as f64).abs()) as f32;
-            let invariants = [log(quad.ratio()), log(quad.second_ratio())];
-            let spread = (3.0 * core::f64::consts::LOG2_E * spread) as f32;
-            entry(LayerQuad { vertices, invariants, spread, start: start as u16 });
+            continue;
+        }
+        for choice in CHOICES {
+            let Some(([a, b, c, d], places)) = vertices(points, layer, start, choice) else { continue };
+            let quad = Quad::new(places);
+            if let Some(spread) = spread(quad.ratio_uncertainty(sigma)) {
+                let log = |ratio: AreaRatio| log2((ratio.upper as f64 / ratio.lower as f64).abs()) as f32;
+                let invariants = [log(quad.ratio()), log(quad.second_ratio())];
+                entry(LayerQuad { vertices: [a, b, c, d, d], invariants, spread, start: start as u16 });
+            }
         }
     }
 }
 
-/// Finds quads of two layers that an affine map could have taken to one another.
+/// Finds quads of two layers that a map could have taken to one another: four vertices by affine invariants, or five by
+/// cross-ratios.
 ///
-/// A layer is its points, the numbers of its vertices (clockwise), and its own number. `sigma` is the noise of each
-/// coordinate, px; `area` the area in px² of the second picture in which corners may lie; `scratch` takes the quads of the
+/// A layer is its points, the numbers of its vertices (clockwise), and its own number. `scratch` takes the quads of the
 /// second layer ([`quads_of`]; with less, the last are left out). Quads may leave out one vertex on either side, so one
 /// lost and one extra vertex within five are bridged; what lies beyond is found by the map. Mirror images are refused.
 ///
-/// Cost: `16 m n` comparisons of two numbers, a few multiplications for each that is near.
+/// Cost: `16 m n` (perspective: 25) comparisons of two numbers, a few multiplications for each that is near.
 pub fn propose(
     first: (&[ImagePoint], &[u16], u8),
     second: (&[ImagePoint], &[u16], u8),
-    sigma: f32,
-    area: f64,
+    terms: Terms,
     scratch: &mut [LayerQuad],
     mut found: impl FnMut(Proposal),
 ) {
     let mut count = 0;
-    describe(second.0, second.1, sigma, |quad| {
+    describe(second.0, second.1, terms.sigma, terms.invariance, |quad| {
         if let Some(place) = scratch.get_mut(count) {
             *place = quad;
             count += 1;
@@ -158,7 +184,7 @@ pub fn propose(
     });
     let quads = scratch.get(..count).unwrap_or_default();
     let modulus = second.1.len().max(1);
-    describe(first.0, first.1, sigma, |one| {
+    describe(first.0, first.1, terms.sigma, terms.invariance, |one| {
         for two in quads {
             let reach = one.spread + two.spread;
             let near = (one.invariants[0] - two.invariants[0]).abs() <= reach
@@ -168,20 +194,28 @@ pub fn propose(
             }
             let place =
                 |points: &[ImagePoint], number: u16| points.get(usize::from(number)).copied().unwrap_or_default();
-            let a = Quad::new(one.vertices.map(|number| place(first.0, number)));
-            let b = Quad::new(two.vertices.map(|number| place(second.0, number)));
-            let Some(deviation) = a.deviation(&b, sigma) else { continue };
-            if deviation.squared > GATE {
-                continue;
-            }
+            let one_places = one.vertices.map(|number| place(first.0, number));
+            let two_places = two.vertices.map(|number| place(second.0, number));
+            let Some((surprise, count)) = compare(one_places, two_places, terms) else { continue };
             let mut pairs = Vec::new();
-            for (&first, &second) in one.vertices.iter().zip(&two.vertices) {
+            for (&first, &second) in one.vertices.iter().zip(&two.vertices).take(count) {
                 let _ = pairs.push(Pairing { first, second });
             }
             let shift = (usize::from(two.start) + modulus - usize::from(one.start) % modulus) % modulus;
             let origin = Origin::Layers { first: first.2, second: second.2, shift: shift as u16 };
-            let surprise = (log2(area / (GATE * deviation.ellipse)) * 256.0) as i32;
             found(Proposal { pairs, surprise, origin });
         }
     });
+}
+
+/// The surprise in 1/256 bit, and how many vertices were compared; `None` if they do not agree.
+fn compare(p: [ImagePoint; 5], q: [ImagePoint; 5], terms: Terms) -> Option<(i32, usize)> {
+    let (bits, count) = match terms.invariance {
+        Invariance::Affine => {
+            let ([p0, p1, p2, p3, _], [q0, q1, q2, q3, _]) = (p, q);
+            (terms.affine_bits(Quad::new([p0, p1, p2, p3]), Quad::new([q0, q1, q2, q3]))?, 4)
+        }
+        Invariance::Perspective => (terms.perspective_bits(p, q)?, 5),
+    };
+    Some(((bits * 256.0) as i32, count))
 }
