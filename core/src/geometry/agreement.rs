@@ -20,12 +20,16 @@ const GATE: f32 = 9.21;
 const WIDEST_GATE: f32 = 144.0;
 /// Assignments and fits for each proposal.
 const ROUNDS: usize = 4;
+/// The same for a homography, which grows out of the part that is nearly affine.
+const ROUNDS_OF_PERSPECTIVE: usize = 8;
 /// Noise levels, as multiples of the expected one, at which the best map is tried.
 const NOISE_LEVELS: [f32; 3] = [1.0, 2.0, 3.0];
 /// Bits by which the best map must exceed the number of maps that could have been tried.
 const LEAST_BITS: f32 = 20.0;
+/// Times the noise within which a growing homography looks for its next corners.
+const GROWING: f32 = 3.0;
 /// Ridge on the perspective terms, in normalized coordinates.
-const PERSPECTIVE_RIDGE: f64 = 1e-4;
+const PERSPECTIVE_RIDGE: f64 = 1e-5;
 /// A different map with more than this share of the best one's bits leaves the answer open.
 const RIVAL: f32 = 0.6;
 
@@ -72,6 +76,14 @@ impl Fit {
         let [[a, b], [_, d]] = self.inverse;
         self.noise * (1.0 + 1.0 / self.count + a * x * x + 2.0 * b * x * y + d * y * y)
     }
+}
+
+/// A map under consideration: the affine fit of what it explains, the map itself, and its bits.
+#[derive(Debug, Clone, Copy)]
+struct Candidate {
+    fit: Fit,
+    map: Homography,
+    bits: f32,
 }
 
 /// A correspondence that one map explains.
@@ -159,40 +171,39 @@ impl<const POINTS: usize> Agreement<POINTS> {
     ) -> Result<BestMap, NoAgreement> {
         self.enter(first, second);
         let trials = tested_maps(self.first.len(), self.second.len());
-        let mut best: Option<(Fit, f32)> = None;
+        let mut best: Option<Candidate> = None;
         let mut rival = 0.0;
         for proposal in proposals {
             let known = |pair: &Pairing| self.best.get(usize::from(pair.first)).is_some_and(|m| m.0 == pair.second);
             if proposal.pairs.iter().all(known) {
                 continue;
             }
-            let Some((fit, bits)) = self.follow(proposal, terms.sigma) else { continue };
+            let Some(candidate) = self.follow(proposal, terms) else { continue };
+            let bits = candidate.bits;
             let matched = self.matched.iter().filter(|m| m.0 != NONE).count();
             let shared = self.best.iter().zip(&self.matched).filter(|(a, b)| a.0 == b.0 && a.0 != NONE).count();
             let different = shared * 2 < matched;
-            let leader = best.map_or(0.0, |(_, bits)| bits);
+            let leader = best.map_or(0.0, |best| best.bits);
             if bits > leader {
                 if different {
                     rival = leader;
                 }
-                best = Some((fit, bits));
+                best = Some(candidate);
                 self.best.clone_from(&self.matched);
             } else if different && bits > rival {
                 rival = bits;
             }
         }
-        let Some((fit, bits)) = best else { return Err(NoAgreement::NothingProposed) };
-        let (bits, rival_bits) = (bits - trials, if rival > trials { rival - trials } else { 0.0 });
+        let Some(best) = best else { return Err(NoAgreement::NothingProposed) };
+        let (bits, rival_bits) = (best.bits - trials, if rival > trials { rival - trials } else { 0.0 });
         if bits < LEAST_BITS {
             return Err(NoAgreement::Chance { bits });
         }
         if rival_bits > RIVAL * bits {
             return Err(NoAgreement::Ambiguous { bits, rival_bits });
         }
-        let (fit, bits, sigma) = self.settle(fit, terms.sigma);
-        let affine = BestMap { second_from_first: fit.map.into(), bits: bits - trials, rival_bits, sigma };
-        let perspective = terms.invariance == Invariance::Perspective;
-        Ok(if perspective { self.tilt(affine, &fit, trials) } else { affine })
+        let (best, sigma) = self.settle(best, terms);
+        Ok(BestMap { second_from_first: best.map, bits: best.bits - trials, rival_bits, sigma })
     }
 
     /// The correspondences of the map found last, in the order of the first corners.
@@ -215,8 +226,8 @@ impl<const POINTS: usize> Agreement<POINTS> {
         self.best.clear();
     }
 
-    /// The map that grows out of a proposal, and what it explains, in bits.
-    fn follow(&mut self, proposal: &Proposal, sigma: f32) -> Option<(Fit, f32)> {
+    /// The map that grows out of a proposal, and what it explains.
+    fn follow(&mut self, proposal: &Proposal, terms: Terms) -> Option<Candidate> {
         self.pairs.clear();
         for pair in &proposal.pairs {
             if let (Some(&from), Some(&to)) =
@@ -225,59 +236,60 @@ impl<const POINTS: usize> Agreement<POINTS> {
                 let _ = self.pairs.push(WeightedPair { from, to, weight: 1.0 });
             }
         }
-        let mut fit = Fit::of(&self.pairs)?;
-        for _ in 0..ROUNDS {
-            self.assign(&fit, sigma);
-            let Some(next) = self.refit() else { break };
-            fit = next;
-        }
-        let bits = self.assign(&fit, sigma);
-        Some((fit, bits))
+        let fit = Fit::of(&self.pairs)?;
+        Some(self.grow(Candidate { fit, map: fit.map.into(), bits: 0.0 }, terms))
     }
 
     /// Tries the best map at several levels of noise and keeps the one at which it explains most.
-    fn settle(&mut self, start: Fit, sigma: f32) -> (Fit, f32, f32) {
-        let (mut best, mut kept) = ((start, f32::MIN, sigma), false);
+    fn settle(&mut self, start: Candidate, terms: Terms) -> (Candidate, f32) {
+        let mut best: Option<(Candidate, f32)> = None;
         for level in NOISE_LEVELS {
-            let sigma = sigma * level;
-            let mut fit = start;
-            for _ in 0..ROUNDS {
-                self.assign(&fit, sigma);
-                let Some(next) = self.refit() else { break };
-                fit = next;
-            }
-            let bits = self.assign(&fit, sigma);
-            if !kept || bits > best.1 {
-                best = (fit, bits, sigma);
-                kept = true;
+            let sigma = terms.sigma * level;
+            let candidate = self.grow(start, Terms { sigma, ..terms });
+            if best.is_none_or(|(best, _)| candidate.bits > best.bits) {
+                best = Some((candidate, sigma));
                 self.best.clone_from(&self.matched);
             }
         }
-        best
+        best.unwrap_or((start, terms.sigma))
     }
 
-    /// The homography of what the affine map explains and what it explains in turn, if that is more. It has a fourth
-    /// pair free, which costs as many bits as there are pairs.
-    fn tilt(&mut self, affine: BestMap, fit: &Fit, trials: f32) -> BestMap {
+    /// Assigns corners and fits again, in turn: an affine map, and a homography of what that explains if the terms ask
+    /// for it and it explains more. A homography has a fourth pair free, which costs as many bits as there are pairs.
+    /// The matches are those of the map that is returned.
+    fn grow(&mut self, start: Candidate, terms: Terms) -> Candidate {
+        let mut best = start;
+        let [.., [g, h, _]] = start.map.0;
+        let affine = g == 0.0 && h == 0.0;
+        for _ in 0..if affine { ROUNDS } else { 0 } {
+            self.assign(&best, terms.sigma);
+            let Some(fit) = self.refit() else { break };
+            (best.fit, best.map) = (fit, fit.map.into());
+        }
+        best.bits = self.assign(&best, terms.sigma);
+        if terms.invariance == Invariance::Affine {
+            return best;
+        }
         let free = log2((self.first.len() * self.second.len()).max(1) as f64) as f32;
         let [source, target] = [&self.first, &self.second].map(|places| {
             let side = places.iter().flatten().fold(1.0_f32, |most, &x| if x > most { x } else { most });
             Normalization::of_frame(side as u16, side as u16)
         });
-        let mut best = affine;
-        self.matched.clone_from(&self.best);
-        for _ in 0..ROUNDS {
-            if self.refit().is_none() {
-                break;
-            }
+        let mut tilted = best;
+        for round in 0..ROUNDS_OF_PERSPECTIVE {
+            let Some(fit) = self.refit() else { break };
             let Some(map) = fit_homography(&self.pairs, source, target, PERSPECTIVE_RIDGE) else { break };
-            let bits = self.pair_up(|point| (map.apply(point), fit.variance(point)), best.sigma) - trials - free;
-            if bits > best.bits {
-                best = BestMap { second_from_first: map, bits, ..best };
-                self.best.clone_from(&self.matched);
-            }
+            // The affine fit tells how certain the map is where its pairs lie, but not beyond: wide gates find the next
+            // corners, and narrow ones judge them.
+            (tilted.fit, tilted.map) = (fit, map);
+            let wide = if round + 2 < ROUNDS_OF_PERSPECTIVE { GROWING } else { 1.0 };
+            tilted.bits = self.assign(&tilted, wide * terms.sigma) - free;
         }
-        best
+        if tilted.bits <= best.bits {
+            best.bits = self.assign(&best, terms.sigma);
+            return best;
+        }
+        tilted
     }
 
     fn refit(&mut self) -> Option<Fit> {
@@ -292,12 +304,7 @@ impl<const POINTS: usize> Agreement<POINTS> {
 
     /// Pairs every first corner with the nearest second one within the gate, one to one; gives the bits. A corner with two
     /// about equally near ones is left out: they decide nothing.
-    fn assign(&mut self, fit: &Fit, sigma: f32) -> f32 {
-        self.pair_up(|point| (fit.map.apply(point), fit.variance(point)), sigma)
-    }
-
-    /// [`Self::assign`] for any map: where it takes a point, and the variance there for corners of variance 1.
-    fn pair_up(&mut self, map: impl Fn([f32; 2]) -> ([f32; 2], f32), sigma: f32) -> f32 {
+    fn assign(&mut self, candidate: &Candidate, sigma: f32) -> f32 {
         self.matched.clear();
         self.taken.clear();
         for _ in &self.second {
@@ -305,11 +312,10 @@ impl<const POINTS: usize> Agreement<POINTS> {
         }
         let mut gates = 0.0;
         for (number, &point) in (0_u16..).zip(&self.first) {
-            let (expected, variance) = map(point);
-            let gate = GATE * sigma * sigma * variance;
+            let gate = GATE * sigma * sigma * candidate.fit.variance(point);
             let gate = if gate < WIDEST_GATE { gate } else { WIDEST_GATE };
             gates += gate;
-            let (nearest, second) = nearest_two(&self.second, expected);
+            let (nearest, second) = nearest_two(&self.second, candidate.map.apply(point));
             let clear = nearest.1 <= gate && (second > gate || second > 4.0 * nearest.1);
             let _ = self.matched.push(if clear { nearest } else { (NONE, 0.0) });
             if clear

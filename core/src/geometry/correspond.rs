@@ -15,7 +15,7 @@ use super::shift::{self, LayerQuad};
 use crate::point::ImagePoint;
 
 /// Bits that a pair needs from its neighbours.
-const LEAST_SUPPORT: f32 = 20.0;
+const LEAST_SUPPORT: f32 = 12.0;
 /// Correspondences of a scene with relief, at least: the epipolar constraint has four unknowns.
 const LEAST_RELIEF: usize = 12;
 /// Share of the smaller picture's corners that an answer about relief must explain.
@@ -38,7 +38,7 @@ const WITNESSES: f64 = 2.0;
 /// The same for an answer that explains [`WHOLE`] of the corners.
 const FEW_WITNESSES: f64 = 1.0;
 /// Corners closer than this to another one, in 1/16 px, are not matched across relief, which may move them as far.
-const CROWDED: i32 = 4 * 16;
+const CROWDED: i32 = 3 * 16;
 /// Fits of the epipolar constraint, each without what the one before found off.
 const ROUNDS: usize = 4;
 

@@ -25,7 +25,7 @@ const CHOICES_OF_FIVE: [[usize; 5]; 5] =
 /// The best circular shift of two layers by the thesis' rule.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Shift<const POINTS: usize> {
-    /// Vertex `k` of the first layer is vertex `k + shift` of the second, modulo its length.
+    /// Vertex `k` of the first layer is vertex `k + shift` of the second, modulo its length, up to where a gap is.
     pub shift: u16,
     /// Quads that agree at this shift.
     pub quads: u16,
@@ -58,45 +58,46 @@ fn plain_ratio(points: &[ImagePoint], layer: &[u16], start: usize) -> Option<Are
     vertices(points, layer, start, CHOICES[0]).map(|(_, places)| Quad::new(places).ratio())
 }
 
-/// The thesis' circular shift (5.3): the shift at which most quads of consecutive vertices satisfy
-/// `|I1(k) - I2(k + shift)| / I1(k) < eps`, and the vertices of those quads; of equally good shifts the smallest.
+/// The thesis' circular shift (5.3): the vertices that follow one another from a start in each layer such that most of
+/// their quads satisfy `|I1(k) - I2(l)| / I1(k) < eps`; of equally good starts those at the lowest
+/// numbers.
 ///
-/// A vertex that one layer lacks breaks the quads that hold it and shifts those behind it: the longer side of the gap
-/// decides (Fig 17). `None` if no quad agrees, or a layer has fewer than four vertices. Layers are lists of numbers of
-/// points, clockwise. Cost: `O(m n)` comparisons in integers.
+/// A vertex that one layer lacks breaks the quads that hold it and shifts those behind it. So the cycles are cut at the
+/// starts, where the gap may be: of six vertices with one occluded the other five are found (Fig 17). `None` if no quad
+/// agrees, or a layer has fewer than four vertices. Layers are lists of numbers of points, clockwise. Cost: `O(m n)`
+/// comparisons in integers, and as many as the shorter layer has vertices for each that agrees.
 pub fn plain_shift<const POINTS: usize>(
     first: (&[ImagePoint], &[u16]),
     second: (&[ImagePoint], &[u16]),
     eps: Tolerance,
 ) -> Option<Shift<POINTS>> {
-    let modulus = second.1.len();
-    if modulus < 4 {
+    let (length, modulus) = (first.1.len(), second.1.len());
+    let shorter = length.min(modulus);
+    if shorter < 4 {
         return None;
     }
-    let agrees = |k: usize, shift: usize| {
-        let (Some(one), Some(two)) =
-            (plain_ratio(first.0, first.1, k), plain_ratio(second.0, second.1, (k + shift) % modulus))
-        else {
-            return false;
-        };
-        one.agrees(two, eps)
+    let agrees = |k: usize, l: usize| {
+        let ratios = (plain_ratio(first.0, first.1, k % length), plain_ratio(second.0, second.1, l % modulus));
+        matches!(ratios, (Some(one), Some(two)) if one.agrees(two, eps))
     };
-    let count = |shift: usize| (0..first.1.len()).filter(|&k| agrees(k, shift)).count();
-    let (mut best, mut quads) = (0, 0);
-    for shift in 0..modulus {
-        let found = count(shift);
-        if found > quads {
-            (best, quads) = (shift, found);
+    let numbers = |(k, l): (usize, usize)| (first.1.get(k), second.1.get(l));
+    let (mut best, mut quads) = ((0, 0), 0);
+    for k in 0..length {
+        for l in (0..modulus).filter(|&l| agrees(k, l)) {
+            let found = 1 + (1..shorter).filter(|step| agrees(k + step, l + step)).count();
+            // By numbers, not by places in the lists: where a list begins must not matter.
+            if found > quads || found == quads && numbers((k, l)) < numbers(best) {
+                (best, quads) = ((k, l), found);
+            }
         }
     }
     if quads == 0 {
         return None;
     }
     let mut pairs: Vec<Pairing, POINTS> = Vec::new();
-    let length = first.1.len();
-    for k in (0..length).filter(|&k| agrees(k, best)) {
-        for step in 0..4 {
-            let partners = (first.1.get((k + step) % length), second.1.get((k + best + step) % modulus));
+    for step in (0..shorter).filter(|step| agrees(best.0 + step, best.1 + step)) {
+        for vertex in step..step + 4 {
+            let partners = (first.1.get((best.0 + vertex) % length), second.1.get((best.1 + vertex) % modulus));
             if let (Some(&first), Some(&second)) = partners
                 && pairs.iter().all(|pair| pair.first != first && pair.second != second)
             {
@@ -105,7 +106,8 @@ pub fn plain_shift<const POINTS: usize>(
             }
         }
     }
-    Some(Shift { shift: best as u16, quads: quads as u16, pairs })
+    let shift = (best.1 + modulus - best.0 % modulus) % modulus;
+    Some(Shift { shift: shift as u16, quads: quads as u16, pairs })
 }
 
 /// Four or five vertices of a layer with their invariants.
