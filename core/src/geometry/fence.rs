@@ -97,45 +97,10 @@ impl Chain {
         true
     }
 
-    fn ends(&self) -> Option<[i64; 2]> {
-        Some([self.corners.first()?.x(), self.corners.get(self.count.checked_sub(1)?)?.x()])
-    }
-}
-
-/// Walks along a chain from its right end to its left.
-struct Walk<'a> {
-    chain: &'a Chain,
-    /// The left corner of the edge.
-    at: usize,
-    left: i64,
-    line: Line,
-}
-
-impl<'a> Walk<'a> {
-    fn new(chain: &'a Chain) -> Option<Self> {
-        let mut walk =
-            Self { chain, at: chain.count.checked_sub(1)?, left: 0, line: Line::through(Key::NONE, Key::NONE) };
-        walk.advance();
-        Some(walk)
-    }
-
-    /// To the next edge on the left; at the left end nothing happens, and `left` is out of reach.
-    fn advance(&mut self) {
-        let Some(at) = self.at.checked_sub(1) else {
-            self.left = i64::MIN;
-            return;
-        };
-        if let Some(&[from, to]) = self.chain.corners.get(at..at + 2) {
-            (self.at, self.left, self.line) = (at, from.x(), Line::through(from, to));
-        }
-    }
-
-    #[inline(always)]
-    fn side(&mut self, key: Key) -> i64 {
-        while key.x() < self.left {
-            self.advance();
-        }
-        self.line.side(key)
+    /// The edges from the right to the left.
+    fn edges(&self) -> impl Iterator<Item = &[Key; 2]> {
+        let edges = self.corners.windows(2).take(self.count.saturating_sub(1)).rev();
+        edges.filter_map(|edge| edge.try_into().ok())
     }
 }
 
@@ -151,15 +116,16 @@ impl Parking {
     /// Puts back to work what is parked outside the fence; without a fence all. `scratch` needs room for those.
     pub(super) fn release(&mut self, keys: &mut [Key], scratch: &mut [Key], fence: Option<&Fence>) {
         let (start, end) = (self.parked, keys.len());
-        let released = fence.and_then(|fence| self.sift(keys, scratch, fence));
-        let released = released.unwrap_or_else(|| {
+        let released = if let Some(fence) = fence {
+            self.sift(keys, scratch, fence)
+        } else {
             let parked = keys.get(start..).unwrap_or(&[]);
             for (place, &key) in scratch.iter_mut().zip(parked.iter().rev()) {
                 *place = key;
             }
             self.parked = end;
             end - start
-        });
+        };
         // From the right end, so that nothing is overwritten before it has moved.
         let (mut left, mut place) = (self.active, self.active + released);
         self.active = place;
@@ -182,23 +148,62 @@ impl Parking {
     }
 
     /// Moves what is parked within the fence to the end, the others to `scratch`, the greatest first; their number.
-    fn sift(&mut self, keys: &mut [Key], scratch: &mut [Key], fence: &Fence) -> Option<usize> {
-        let [left, right] = fence.upper.ends()?;
-        let (mut upper, mut lower) = (Walk::new(&fence.upper)?, Walk::new(&fence.lower)?);
-        let (mut parked, mut released) = (keys.len(), 0);
-        for at in (self.parked..keys.len()).rev() {
-            let Some(&key) = keys.get(at) else { break };
-            let stays = (upper.side(key) >= 0) & (lower.side(key) <= 0) & (left <= key.x()) & (key.x() <= right);
-            if let Some(place) = keys.get_mut(parked - 1) {
+    fn sift(&mut self, keys: &mut [Key], scratch: &mut [Key], fence: &Fence) -> usize {
+        let mut sieve = Sieve { at: keys.len(), parked: keys.len(), released: 0, keys, scratch, end: self.parked };
+        // Strips from the right to the left, in each of which the same edges are above and below.
+        let (mut uppers, mut lowers) = (fence.upper.edges(), fence.lower.edges());
+        let (mut upper, mut lower) = (uppers.next(), lowers.next());
+        if let Some([_, last]) = upper {
+            sieve.strip(last.x() + 1, |_| false);
+        }
+        while let (Some(&[above, above_right]), Some(&[below, below_right])) = (upper, lower) {
+            let (upper_line, lower_line) = (Line::through(above, above_right), Line::through(below, below_right));
+            sieve.strip(above.x().max(below.x()), |key| (upper_line.side(key) >= 0) & (lower_line.side(key) <= 0));
+            if above.x() >= below.x() {
+                upper = uppers.next();
+            }
+            if below.x() >= above.x() {
+                lower = lowers.next();
+            }
+        }
+        sieve.strip(0, |_| false);
+        self.parked = sieve.parked;
+        sieve.released
+    }
+}
+
+/// Goes through parked keys from the greatest to the least.
+struct Sieve<'a> {
+    keys: &'a mut [Key],
+    scratch: &'a mut [Key],
+    /// The keys from here on were looked at.
+    at: usize,
+    /// The least of all.
+    end: usize,
+    parked: usize,
+    released: usize,
+}
+
+impl Sieve<'_> {
+    /// Goes on as far as `left`, and keeps parked what `stays`.
+    #[inline(always)]
+    fn strip(&mut self, left: i64, stays: impl Fn(Key) -> bool) {
+        let (mut at, mut parked, mut released) = (self.at, self.parked, self.released);
+        while at > self.end
+            && let Some(&key) = self.keys.get(at - 1)
+            && key.x() >= left
+        {
+            at -= 1;
+            let stays = stays(key);
+            if let Some(place) = self.keys.get_mut(parked - 1) {
                 *place = key;
             }
             parked -= usize::from(stays);
-            if let Some(place) = scratch.get_mut(released) {
+            if let Some(place) = self.scratch.get_mut(released) {
                 *place = key;
             }
             released += usize::from(!stays);
         }
-        self.parked = parked;
-        Some(released)
+        (self.at, self.parked, self.released) = (at, parked, released);
     }
 }

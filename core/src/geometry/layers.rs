@@ -18,7 +18,7 @@ use crate::point::ImagePoint;
 const NONE: u16 = u16::MAX;
 
 /// Fewer points are all looked at for each layer.
-const MANY: usize = 256;
+const MANY: usize = 400;
 
 /// What is left within the innermost layer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -230,13 +230,14 @@ impl<const POINTS: usize, const LAYERS: usize> HullLayers<POINTS, LAYERS> {
     }
 }
 
-/// A fence so deep within a hull that it costs least to have `parked` points looked at whenever it is reached.
+/// A fence so deep within a hull that it costs least to look at all `parked` points whenever a layer reaches it.
 ///
-/// With points spread evenly a layer has about as many as the latest, h of m. Between hull and fence t layers have t h / 2
-/// at work on the average; all m are looked at once in t layers. The sum is least for t ~ sqrt(m / h), which is the share
-/// sqrt(h / m) of the area and half of that of the way to the middle.
+/// With points spread evenly a layer has about as many as the latest, h of m. If hull and fence are t layers apart, t h / 2
+/// points are at work on the average, and m are looked at every t layers. The sum is least for t ~ sqrt(m / h): a share of
+/// sqrt(h / m) of the area, and half of that of the way to the middle. As the layers reach a fence unevenly, half as
+/// deep again is better.
 fn fence_within(hull: &[Key], outline: Outline, parked: usize) -> Option<Fence> {
-    let share = (((outline.vertices as u64) << 32) / (parked as u64).max(1)).isqrt() / 2;
+    let share = (((outline.vertices as u64) << 32) / (parked as u64).max(1)).isqrt() * 3 / 4;
     Fence::within(hull, outline, share.min(1 << 15))
 }
 

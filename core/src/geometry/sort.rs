@@ -23,13 +23,11 @@ pub(super) fn sort(keys: &mut [Key], scratch: &mut [Key], width: u64, height: u6
         let bits = (usize::BITS - keys.len().leading_zeros()).min(DIGIT_BITS);
         let shift = Key::X_SHIFT + x_bits.saturating_sub(bits);
         let mut starts = count(keys, shift);
-        if starts.iter().all(|&crowd| crowd <= CROWD) {
-            accumulate(&mut starts);
+        let used = starts.get_mut(..=(width << Key::X_SHIFT >> shift) as usize % DIGITS).unwrap_or_default();
+        if used.iter().all(|&crowd| crowd <= CROWD) {
+            accumulate(used);
             distribute(keys, scratch, &mut starts, shift);
-            for (key, sorted) in keys.iter_mut().zip(scratch) {
-                *key = *sorted;
-            }
-            insert(keys);
+            insert(scratch, keys);
             return;
         }
     }
@@ -65,7 +63,7 @@ fn count(keys: &[Key], shift: u32) -> [u16; DIGITS] {
 }
 
 /// Counts become the places where each digit starts.
-fn accumulate(counts: &mut [u16; DIGITS]) {
+fn accumulate(counts: &mut [u16]) {
     let mut start = 0;
     for count in counts {
         (*count, start) = (start, start + *count);
@@ -82,18 +80,20 @@ fn distribute(from: &[Key], to: &mut [Key], starts: &mut [u16; DIGITS], shift: u
     }
 }
 
-fn insert(keys: &mut [Key]) {
-    for end in 1..keys.len() {
-        let Some(&key) = keys.get(end) else { return };
+/// Insertion sort: `from` is nearly sorted.
+fn insert(from: &[Key], to: &mut [Key]) {
+    for (end, &key) in from.iter().enumerate() {
         let mut at = end;
-        while at > 0
-            && let Some([before, place]) = keys.get_mut(at - 1..=at)
-            && *before > key
+        while let Some(before) = at.checked_sub(1)
+            && let Some(&[other, _]) = to.get(before..=at)
+            && other > key
         {
-            *place = *before;
-            at -= 1;
+            if let Some(place) = to.get_mut(at) {
+                *place = other;
+            }
+            at = before;
         }
-        if let Some(place) = keys.get_mut(at) {
+        if let Some(place) = to.get_mut(at) {
             *place = key;
         }
     }
