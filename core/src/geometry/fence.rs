@@ -39,8 +39,8 @@ impl Fence {
         let upper = hull.get(..=outline.turn)?;
         let lower = hull.get(outline.turn..)?;
         Some(Self {
-            upper: Chain::new(upper.len(), upper.iter().map(inwards))?,
-            lower: Chain::new(lower.len() + 1, core::iter::once(first).chain(lower.iter().rev()).map(inwards))?,
+            upper: Chain::new(upper.len(), upper.iter().map(inwards), 1)?,
+            lower: Chain::new(lower.len() + 1, core::iter::once(first).chain(lower.iter().rev()).map(inwards), -1)?,
         })
     }
 
@@ -57,26 +57,24 @@ impl Fence {
 }
 
 impl Chain {
-    /// Of ascending corners as many as there is room for, the first and the last among them.
-    fn new(count: usize, corners: impl Iterator<Item = Key>) -> Option<Self> {
+    /// Of ascending corners as many as there is room for, the first and the last among them. Of corners with the same x
+    /// the outermost is kept: the lowest y if `side` is 1, else the highest.
+    fn new(count: usize, corners: impl Iterator<Item = Key>, side: i64) -> Option<Self> {
         let mut chain = Self { corners: [Key::NONE; CORNERS], count: 0 };
-        let step = count / CORNERS + 1;
-        let mut latest = None;
-        for (number, corner) in corners.enumerate() {
-            let is_last = number + 1 == count;
-            if !is_last && number % step != 0 {
-                continue;
-            }
-            if latest.is_some_and(|latest: Key| latest.x() == corner.x()) {
-                // The last one takes the place of the one above or below it; others are left out.
-                if !is_last {
-                    continue;
+        let step = count.div_ceil(CORNERS - 1);
+        let chosen = corners.enumerate().filter(|(number, _)| number % step == 0 || number + 1 == count);
+        for (_, corner) in chosen {
+            match chain.corners.get_mut(..chain.count).and_then(<[_]>::last_mut) {
+                Some(latest) if latest.x() == corner.x() => {
+                    if (latest.y() - corner.y()) * side > 0 {
+                        *latest = corner;
+                    }
                 }
-                chain.count = chain.count.checked_sub(1).filter(|&count| count > 0)?;
+                _ => {
+                    *chain.corners.get_mut(chain.count)? = corner;
+                    chain.count += 1;
+                }
             }
-            *chain.corners.get_mut(chain.count)? = corner;
-            chain.count += 1;
-            latest = Some(corner);
         }
         (chain.count >= 2).then_some(chain)
     }
@@ -205,5 +203,70 @@ impl Sieve<'_> {
             released += usize::from(!stays);
         }
         (self.at, self.parked, self.released) = (at, parked, released);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::chain::strict_hull;
+
+    fn hull<const N: usize>(mut keys: [Key; N]) -> ([Key; N], Outline) {
+        let mut buffer = [Key::NONE; N];
+        keys.sort_unstable();
+        let outline = strict_hull(&keys, &mut buffer);
+        (buffer, outline)
+    }
+
+    fn square(least: u64, most: u64) -> ([Key; 4], Outline) {
+        hull([(least, least), (most, least), (most, most), (least, most)].map(|(x, y)| Key::at(x, y)))
+    }
+
+    #[test]
+    fn a_fence_parks_what_is_within_it() {
+        let (hull, outline) = square(0, 100);
+        // A quarter of the way from (0, 0) to the middle (50, 50).
+        let fence = Fence::within(&hull, outline, 1 << 14).unwrap();
+        assert!(fence.is_within(&hull, outline));
+        let mut keys = core::array::from_fn::<_, 101, _>(|x| Key::at(x as u64, 20));
+        let mut scratch = [Key::NONE; 101];
+        let mut parking = Parking { active: 0, parked: 0 };
+        parking.release(&mut keys, &mut scratch, Some(&fence));
+        // From 12 to 87, ends included.
+        assert_eq!(parking, Parking { active: 25, parked: 25 });
+        assert!(keys[..25].iter().map(|key| key.x()).eq((0..12).chain(88..=100)));
+        assert!(keys[25..].iter().map(|key| key.x()).eq(12..88));
+        parking.release(&mut keys, &mut scratch, None);
+        assert_eq!(parking, Parking { active: 101, parked: 101 });
+        assert!(keys.iter().map(|key| key.x()).eq(0..=100));
+    }
+
+    #[test]
+    fn above_and_below_are_outside() {
+        let (hull, outline) = square(0, 100);
+        let fence = Fence::within(&hull, outline, 1 << 14).unwrap();
+        let mut keys = core::array::from_fn::<_, 101, _>(|y| Key::at(50, y as u64));
+        let mut parking = Parking { active: 0, parked: 0 };
+        parking.release(&mut keys, &mut [Key::NONE; 101], Some(&fence));
+        assert!(keys[..parking.active].iter().map(|key| key.y()).eq((0..12).chain(88..=100)));
+    }
+
+    #[test]
+    fn a_fence_knows_when_it_is_reached() {
+        let (hull, outline) = square(0, 100);
+        let fence = Fence::within(&hull, outline, 1 << 14).unwrap();
+        for (least, within) in [(11, true), (12, false), (13, false), (40, false)] {
+            let (hull, outline) = square(least, 100 - least);
+            assert_eq!(fence.is_within(&hull, outline), within, "{least}");
+        }
+        // One side only.
+        let (hull, outline) = self::hull([(0, 0), (100, 0), (100, 100), (0, 80)].map(|(x, y)| Key::at(x, y)));
+        assert!(!fence.is_within(&hull, outline));
+    }
+
+    #[test]
+    fn without_width_there_is_no_fence() {
+        let (hull, outline) = hull([(0, 0), (1, 5), (0, 9)].map(|(x, y)| Key::at(x, y)));
+        assert!(Fence::within(&hull, outline, 1 << 15).is_none());
     }
 }
