@@ -61,7 +61,7 @@ impl Chain {
     /// the outermost is kept: the lowest y if `side` is 1, else the highest.
     fn new(count: usize, corners: impl Iterator<Item = Key>, side: i64) -> Option<Self> {
         let mut chain = Self { corners: [Key::NONE; CORNERS], count: 0 };
-        let step = count.div_ceil(CORNERS - 1);
+        let step = count.div_ceil(CORNERS - 1).max(1);
         let chosen = corners.enumerate().filter(|(number, _)| number % step == 0 || number + 1 == count);
         for (_, corner) in chosen {
             match chain.corners.get_mut(..chain.count).and_then(<[_]>::last_mut) {
@@ -97,7 +97,7 @@ impl Chain {
 
     /// The edges from the right to the left.
     fn edges(&self) -> impl Iterator<Item = &[Key; 2]> {
-        let edges = self.corners.windows(2).take(self.count.saturating_sub(1)).rev();
+        let edges = self.corners.get(..self.count).unwrap_or(&[]).windows(2).rev();
         edges.filter_map(|edge| edge.try_into().ok())
     }
 }

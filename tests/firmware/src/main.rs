@@ -13,6 +13,7 @@
 
 mod device;
 mod enroll;
+mod nest;
 mod outcome;
 mod recognize;
 #[cfg_attr(target_os = "none", path = "start_bare.rs")]
@@ -54,6 +55,9 @@ static MEMORY_TABLE: [u32; 6] = [
 fn run(device: &mut Device) -> Result<Outcome, Failure> {
     let mut features = HandheldFeatures::new();
     see(device, &mut features)?;
+    if !nest::nest(features.view())? {
+        return Err(Failure::Nesting);
+    }
     enroll::enroll(features.view(), device.table())?;
     #[cfg(feature = "control")]
     assert!(features.view().len() < 300, "the control has a panic path");
