@@ -19,6 +19,7 @@ fn main() {
         (Source::Frame, [47, 200, 1_000, 10_000].as_slice()),
         (Source::Square, &[47, 200, 1_000, 10_000]),
         (Source::Corners, &[47, 200]),
+        (Source::Windows, &[47, 200, 1_000, 10_000]),
     ] {
         for &size in sizes {
             let sets = Sets::new(source, size);

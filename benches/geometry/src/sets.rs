@@ -21,6 +21,8 @@ pub enum Source {
     Square,
     /// Chosen from the corners of the committed pictures, each set under an affine map of its own.
     Corners,
+    /// The four corners of windows in rows and columns, some missing: many on one line.
+    Windows,
 }
 
 impl Source {
@@ -29,6 +31,7 @@ impl Source {
             Self::Frame => "frame",
             Self::Square => "square",
             Self::Corners => "corners",
+            Self::Windows => "windows",
         }
     }
 }
@@ -49,6 +52,10 @@ impl Sets {
             Source::Corners => {
                 let picture = &pictures[random.below(pictures.len() as i32) as usize];
                 random.mapped(random.clone().chosen(picture, size))
+            }
+            Source::Windows => {
+                let windows = random.windows(size);
+                random.chosen(&windows, size)
             }
         });
         Self { source, size, all: all.collect() }
@@ -79,6 +86,19 @@ impl Random {
         }
         points.truncate(count);
         points
+    }
+
+    /// A tenth more points than asked for, of windows as wide as their distance.
+    fn windows(&mut self, count: usize) -> Vec<ImagePoint> {
+        let windows = (count as i32 * 11 / 40) + 1;
+        let columns = windows.isqrt() + self.below(3);
+        let [width, height] = [20, 30].map(|least| least + self.below(200));
+        let corner = |window: i32| (window % columns * 2 * width, window / columns * 2 * height);
+        (0..windows)
+            .map(corner)
+            .flat_map(|(x, y)| [(x, y), (x + width, y), (x, y + height), (x + width, y + height)])
+            .map(|(x, y)| ImagePoint::new(x, y))
+            .collect()
     }
 
     /// Turned, stretched and sheared by up to a quarter.

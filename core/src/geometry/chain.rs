@@ -3,7 +3,7 @@
 use super::key::{Key, Line};
 
 /// Lists that are no longer than this are not thinned: a chain over them costs less.
-const SHORT: usize = 6;
+const SHORT: usize = 8;
 /// How often a list is thinned at most; what is left then is for the chain, so that the cost stays linear.
 const THINNINGS: u32 = 6;
 

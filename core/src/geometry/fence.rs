@@ -39,8 +39,8 @@ impl Fence {
         let upper = hull.get(..=outline.turn)?;
         let lower = hull.get(outline.turn..)?;
         Some(Self {
-            upper: Chain::new(upper.len(), upper.iter().map(inwards))?,
-            lower: Chain::new(lower.len() + 1, core::iter::once(first).chain(lower.iter().rev()).map(inwards))?,
+            upper: Chain::new(upper.len(), upper.iter().map(inwards), 1)?,
+            lower: Chain::new(lower.len() + 1, core::iter::once(first).chain(lower.iter().rev()).map(inwards), -1)?,
         })
     }
 
@@ -57,26 +57,24 @@ impl Fence {
 }
 
 impl Chain {
-    /// Of ascending corners as many as there is room for, the first and the last among them.
-    fn new(count: usize, corners: impl Iterator<Item = Key>) -> Option<Self> {
+    /// Of ascending corners as many as there is room for, the first and the last among them. Of corners with the same x
+    /// the outermost is kept: the lowest y if `side` is 1, else the highest.
+    fn new(count: usize, corners: impl Iterator<Item = Key>, side: i64) -> Option<Self> {
         let mut chain = Self { corners: [Key::NONE; CORNERS], count: 0 };
-        let step = count / CORNERS + 1;
-        let mut latest = None;
-        for (number, corner) in corners.enumerate() {
-            let is_last = number + 1 == count;
-            if !is_last && number % step != 0 {
-                continue;
-            }
-            if latest.is_some_and(|latest: Key| latest.x() == corner.x()) {
-                // The last one takes the place of the one above or below it; others are left out.
-                if !is_last {
-                    continue;
+        let step = count.div_ceil(CORNERS - 1).max(1);
+        let chosen = corners.enumerate().filter(|(number, _)| number % step == 0 || number + 1 == count);
+        for (_, corner) in chosen {
+            match chain.corners.get_mut(..chain.count).and_then(<[_]>::last_mut) {
+                Some(latest) if latest.x() == corner.x() => {
+                    if (latest.y() - corner.y()) * side > 0 {
+                        *latest = corner;
+                    }
                 }
-                chain.count = chain.count.checked_sub(1).filter(|&count| count > 0)?;
+                _ => {
+                    *chain.corners.get_mut(chain.count)? = corner;
+                    chain.count += 1;
+                }
             }
-            *chain.corners.get_mut(chain.count)? = corner;
-            chain.count += 1;
-            latest = Some(corner);
         }
         (chain.count >= 2).then_some(chain)
     }
@@ -97,45 +95,10 @@ impl Chain {
         true
     }
 
-    fn ends(&self) -> Option<[i64; 2]> {
-        Some([self.corners.first()?.x(), self.corners.get(self.count.checked_sub(1)?)?.x()])
-    }
-}
-
-/// Walks along a chain from its right end to its left.
-struct Walk<'a> {
-    chain: &'a Chain,
-    /// The left corner of the edge.
-    at: usize,
-    left: i64,
-    line: Line,
-}
-
-impl<'a> Walk<'a> {
-    fn new(chain: &'a Chain) -> Option<Self> {
-        let mut walk =
-            Self { chain, at: chain.count.checked_sub(1)?, left: 0, line: Line::through(Key::NONE, Key::NONE) };
-        walk.advance();
-        Some(walk)
-    }
-
-    /// To the next edge on the left; at the left end nothing happens, and `left` is out of reach.
-    fn advance(&mut self) {
-        let Some(at) = self.at.checked_sub(1) else {
-            self.left = i64::MIN;
-            return;
-        };
-        if let Some(&[from, to]) = self.chain.corners.get(at..at + 2) {
-            (self.at, self.left, self.line) = (at, from.x(), Line::through(from, to));
-        }
-    }
-
-    #[inline(always)]
-    fn side(&mut self, key: Key) -> i64 {
-        while key.x() < self.left {
-            self.advance();
-        }
-        self.line.side(key)
+    /// The edges from the right to the left.
+    fn edges(&self) -> impl Iterator<Item = &[Key; 2]> {
+        let edges = self.corners.get(..self.count).unwrap_or(&[]).windows(2).rev();
+        edges.filter_map(|edge| edge.try_into().ok())
     }
 }
 
@@ -151,15 +114,16 @@ impl Parking {
     /// Puts back to work what is parked outside the fence; without a fence all. `scratch` needs room for those.
     pub(super) fn release(&mut self, keys: &mut [Key], scratch: &mut [Key], fence: Option<&Fence>) {
         let (start, end) = (self.parked, keys.len());
-        let released = fence.and_then(|fence| self.sift(keys, scratch, fence));
-        let released = released.unwrap_or_else(|| {
+        let released = if let Some(fence) = fence {
+            self.sift(keys, scratch, fence)
+        } else {
             let parked = keys.get(start..).unwrap_or(&[]);
             for (place, &key) in scratch.iter_mut().zip(parked.iter().rev()) {
                 *place = key;
             }
             self.parked = end;
             end - start
-        });
+        };
         // From the right end, so that nothing is overwritten before it has moved.
         let (mut left, mut place) = (self.active, self.active + released);
         self.active = place;
@@ -182,23 +146,127 @@ impl Parking {
     }
 
     /// Moves what is parked within the fence to the end, the others to `scratch`, the greatest first; their number.
-    fn sift(&mut self, keys: &mut [Key], scratch: &mut [Key], fence: &Fence) -> Option<usize> {
-        let [left, right] = fence.upper.ends()?;
-        let (mut upper, mut lower) = (Walk::new(&fence.upper)?, Walk::new(&fence.lower)?);
-        let (mut parked, mut released) = (keys.len(), 0);
-        for at in (self.parked..keys.len()).rev() {
-            let Some(&key) = keys.get(at) else { break };
-            let stays = (upper.side(key) >= 0) & (lower.side(key) <= 0) & (left <= key.x()) & (key.x() <= right);
-            if let Some(place) = keys.get_mut(parked - 1) {
+    fn sift(&mut self, keys: &mut [Key], scratch: &mut [Key], fence: &Fence) -> usize {
+        let mut sieve = Sieve { at: keys.len(), parked: keys.len(), released: 0, keys, scratch, end: self.parked };
+        // Strips from the right to the left, in each of which the same edges are above and below.
+        let (mut uppers, mut lowers) = (fence.upper.edges(), fence.lower.edges());
+        let (mut upper, mut lower) = (uppers.next(), lowers.next());
+        if let Some([_, last]) = upper {
+            sieve.strip(last.x() + 1, |_| false);
+        }
+        while let (Some(&[above, above_right]), Some(&[below, below_right])) = (upper, lower) {
+            let (upper_line, lower_line) = (Line::through(above, above_right), Line::through(below, below_right));
+            sieve.strip(above.x().max(below.x()), |key| (upper_line.side(key) >= 0) & (lower_line.side(key) <= 0));
+            if above.x() >= below.x() {
+                upper = uppers.next();
+            }
+            if below.x() >= above.x() {
+                lower = lowers.next();
+            }
+        }
+        sieve.strip(0, |_| false);
+        self.parked = sieve.parked;
+        sieve.released
+    }
+}
+
+/// Goes through parked keys from the greatest to the least.
+struct Sieve<'a> {
+    keys: &'a mut [Key],
+    scratch: &'a mut [Key],
+    /// The keys from here on were looked at.
+    at: usize,
+    /// The least of all.
+    end: usize,
+    parked: usize,
+    released: usize,
+}
+
+impl Sieve<'_> {
+    /// Goes on as far as `left`, and keeps parked what `stays`.
+    #[inline(always)]
+    fn strip(&mut self, left: i64, stays: impl Fn(Key) -> bool) {
+        let (mut at, mut parked, mut released) = (self.at, self.parked, self.released);
+        while at > self.end
+            && let Some(&key) = self.keys.get(at - 1)
+            && key.x() >= left
+        {
+            at -= 1;
+            let stays = stays(key);
+            if let Some(place) = self.keys.get_mut(parked - 1) {
                 *place = key;
             }
             parked -= usize::from(stays);
-            if let Some(place) = scratch.get_mut(released) {
+            if let Some(place) = self.scratch.get_mut(released) {
                 *place = key;
             }
             released += usize::from(!stays);
         }
-        self.parked = parked;
-        Some(released)
+        (self.at, self.parked, self.released) = (at, parked, released);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::chain::strict_hull;
+
+    fn hull<const N: usize>(mut keys: [Key; N]) -> ([Key; N], Outline) {
+        let mut buffer = [Key::NONE; N];
+        keys.sort_unstable();
+        let outline = strict_hull(&keys, &mut buffer);
+        (buffer, outline)
+    }
+
+    fn square(least: u64, most: u64) -> ([Key; 4], Outline) {
+        hull([(least, least), (most, least), (most, most), (least, most)].map(|(x, y)| Key::at(x, y)))
+    }
+
+    #[test]
+    fn a_fence_parks_what_is_within_it() {
+        let (hull, outline) = square(0, 100);
+        // A quarter of the way from (0, 0) to the middle (50, 50).
+        let fence = Fence::within(&hull, outline, 1 << 14).unwrap();
+        assert!(fence.is_within(&hull, outline));
+        let mut keys = core::array::from_fn::<_, 101, _>(|x| Key::at(x as u64, 20));
+        let mut scratch = [Key::NONE; 101];
+        let mut parking = Parking { active: 0, parked: 0 };
+        parking.release(&mut keys, &mut scratch, Some(&fence));
+        // From 12 to 87, ends included.
+        assert_eq!(parking, Parking { active: 25, parked: 25 });
+        assert!(keys[..25].iter().map(|key| key.x()).eq((0..12).chain(88..=100)));
+        assert!(keys[25..].iter().map(|key| key.x()).eq(12..88));
+        parking.release(&mut keys, &mut scratch, None);
+        assert_eq!(parking, Parking { active: 101, parked: 101 });
+        assert!(keys.iter().map(|key| key.x()).eq(0..=100));
+    }
+
+    #[test]
+    fn above_and_below_are_outside() {
+        let (hull, outline) = square(0, 100);
+        let fence = Fence::within(&hull, outline, 1 << 14).unwrap();
+        let mut keys = core::array::from_fn::<_, 101, _>(|y| Key::at(50, y as u64));
+        let mut parking = Parking { active: 0, parked: 0 };
+        parking.release(&mut keys, &mut [Key::NONE; 101], Some(&fence));
+        assert!(keys[..parking.active].iter().map(|key| key.y()).eq((0..12).chain(88..=100)));
+    }
+
+    #[test]
+    fn a_fence_knows_when_it_is_reached() {
+        let (hull, outline) = square(0, 100);
+        let fence = Fence::within(&hull, outline, 1 << 14).unwrap();
+        for (least, within) in [(11, true), (12, false), (13, false), (40, false)] {
+            let (hull, outline) = square(least, 100 - least);
+            assert_eq!(fence.is_within(&hull, outline), within, "{least}");
+        }
+        // One side only.
+        let (hull, outline) = self::hull([(0, 0), (100, 0), (100, 100), (0, 80)].map(|(x, y)| Key::at(x, y)));
+        assert!(!fence.is_within(&hull, outline));
+    }
+
+    #[test]
+    fn without_width_there_is_no_fence() {
+        let (hull, outline) = hull([(0, 0), (1, 5), (0, 9)].map(|(x, y)| Key::at(x, y)));
+        assert!(Fence::within(&hull, outline, 1 << 15).is_none());
     }
 }

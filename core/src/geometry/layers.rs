@@ -18,7 +18,7 @@ use crate::point::ImagePoint;
 const NONE: u16 = u16::MAX;
 
 /// Fewer points are all looked at for each layer.
-const MANY: usize = 256;
+const MANY: usize = 400;
 
 /// What is left within the innermost layer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -108,13 +108,14 @@ impl<const POINTS: usize, const LAYERS: usize> HullLayers<POINTS, LAYERS> {
                 *slot = number;
             }
         }
-        let layers = self.peel_distinct(distinct)?;
+        let layers = self.peel_distinct(distinct, MANY)?;
         (self.layers, self.distinct, self.points) = (layers, distinct, points.len());
         Ok(())
     }
 
-    /// Takes the sorted points `left` apart and returns the number of layers.
-    fn peel_distinct(&mut self, distinct: usize) -> Result<usize, GeometryError> {
+    /// Takes the sorted points `left` apart and returns the number of layers. At least `many` points are parked behind a
+    /// fence; the result does not depend on it.
+    fn peel_distinct(&mut self, distinct: usize, many: usize) -> Result<usize, GeometryError> {
         let mut left = self.left.get_mut(..distinct).unwrap_or_default();
         let mut parking = Parking { active: distinct, parked: distinct };
         let (mut fence, mut refused) = (None, 0);
@@ -123,15 +124,19 @@ impl<const POINTS: usize, const LAYERS: usize> HullLayers<POINTS, LAYERS> {
             let parked = left.len() - parking.parked;
             let active = left.get_mut(..parking.active).unwrap_or_default();
             let outline = strict_hull(active, &mut self.stack);
-            if parked > 0 && !fence.is_some_and(|fence: Fence| fence.is_within(&self.stack, outline)) {
+            // A fence may lie on a line, too; what is parked there would be lost.
+            let has_area = outline.vertices >= 3;
+            let is_fenced = |fence: Fence| has_area && fence.is_within(&self.stack, outline);
+            if parked > 0 && !fence.is_some_and(is_fenced) {
                 // What is parked may reach beyond the hull: park less, or nothing if that did not help before.
-                fence = if parked >= MANY && refused < 2 { fence_within(&self.stack, outline, parked) } else { None };
+                let again = has_area && parked >= many && refused < 2;
+                fence = if again { fence_within(&self.stack, outline, parked) } else { None };
                 parking.release(left, &mut self.stack, fence.as_ref());
                 refused += 1;
                 continue;
             }
             refused = 0;
-            if outline.vertices < 3 {
+            if !has_area {
                 for (slot, key) in self.order.iter_mut().skip(end).zip(active) {
                     *slot = key.number();
                 }
@@ -159,7 +164,7 @@ impl<const POINTS: usize, const LAYERS: usize> HullLayers<POINTS, LAYERS> {
                 kept += usize::from(stays);
             }
             parking.active = kept;
-            if parked == 0 && kept >= MANY {
+            if parked == 0 && kept >= many {
                 fence = fence_within(&self.stack, outline, kept);
                 if fence.is_some() {
                     left = core::mem::take(&mut left).get_mut(..kept).unwrap_or_default();
@@ -230,13 +235,14 @@ impl<const POINTS: usize, const LAYERS: usize> HullLayers<POINTS, LAYERS> {
     }
 }
 
-/// A fence so deep within a hull that it costs least to have `parked` points looked at whenever it is reached.
+/// A fence so deep within a hull that it costs least to look at all `parked` points whenever a layer reaches it.
 ///
-/// With points spread evenly a layer has about as many as the latest, h of m. Between hull and fence t layers have t h / 2
-/// at work on the average; all m are looked at once in t layers. The sum is least for t ~ sqrt(m / h), which is the share
-/// sqrt(h / m) of the area and half of that of the way to the middle.
+/// With points spread evenly a layer has about as many as the latest, h of m. If hull and fence are t layers apart, t h / 2
+/// points are at work on the average, and m are looked at every t layers. The sum is least for t ~ sqrt(m / h): a share of
+/// sqrt(h / m) of the area, and half of that of the way to the middle. As the layers reach a fence unevenly, half as
+/// deep again is better.
 fn fence_within(hull: &[Key], outline: Outline, parked: usize) -> Option<Fence> {
-    let share = (((outline.vertices as u64) << 32) / (parked as u64).max(1)).isqrt() / 2;
+    let share = (((outline.vertices as u64) << 32) / (parked as u64).max(1)).isqrt() * 3 / 4;
     Fence::within(hull, outline, share.min(1 << 15))
 }
 
@@ -309,6 +315,42 @@ mod tests {
         let far = points([(0, 0), (0, 1 << 23)]);
         let limit = super::super::COORDINATE_LIMIT;
         assert_eq!(layers.peel(&far), Err(GeometryError::CoordinateOutOfRange { point: 1, found: 1 << 23, limit }));
+    }
+
+    #[test]
+    fn parking_changes_nothing() {
+        const POINTS: usize = 160;
+        let mut state = 3_u64;
+        let mut random = |end: u64| {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            ((state >> 33) % end) as i32
+        };
+        let mut storage = HullLayers::<POINTS, 53>::new();
+        let mut peel = |points: &[ImagePoint], many: usize| {
+            let distinct = key::arrange(points, &mut storage.left, &mut storage.stack, |_, _| {}).unwrap();
+            storage.layer_of = [NONE; POINTS];
+            let layers = storage.peel_distinct(distinct, many).unwrap();
+            (layers, storage.order, storage.ends, storage.layer_of)
+        };
+        for (width, height) in [(5, 5), (40, 3), (3, 40), (30, 30), (10_000, 10_000), (1 << 23, 1 << 23)] {
+            for count in (1..POINTS).chain([POINTS; 40]) {
+                // Some in a heap, so that fences and layers meet unevenly.
+                let spread: [u64; 2] = if count % 3 == 0 { [width / 5 + 1, height] } else { [width, height] };
+                let mut points = [ImagePoint::default(); POINTS];
+                points.fill_with(|| {
+                    let [width, height] = if random(2) == 0 { spread } else { [width, height] };
+                    ImagePoint::new(random(width), random(height))
+                });
+                let points = points.get(..count).unwrap();
+                let without = peel(points, usize::MAX);
+                for many in [1, 4, 20] {
+                    let (layers, order, ends, layer_of) = peel(points, many);
+                    assert_eq!(layers, without.0, "{points:?}");
+                    assert_eq!(ends.get(..layers), without.2.get(..layers), "{points:?}");
+                    assert_eq!((order, layer_of), (without.1, without.3), "{points:?}");
+                }
+            }
+        }
     }
 
     #[test]

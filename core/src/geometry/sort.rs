@@ -20,16 +20,14 @@ pub(super) fn sort(keys: &mut [Key], scratch: &mut [Key], width: u64, height: u6
     let (x_bits, y_bits) = (u64::BITS - width.leading_zeros(), u64::BITS - height.leading_zeros());
     if keys.len() <= FEW {
         // About as many digits as keys.
-        let bits = (usize::BITS - keys.len().leading_zeros()).min(DIGIT_BITS);
+        let bits = (usize::BITS - keys.len().leading_zeros()).clamp(1, DIGIT_BITS);
         let shift = Key::X_SHIFT + x_bits.saturating_sub(bits);
         let mut starts = count(keys, shift);
-        if starts.iter().all(|&crowd| crowd <= CROWD) {
-            accumulate(&mut starts);
+        let used = starts.get_mut(..=(width << Key::X_SHIFT >> shift) as usize % DIGITS).unwrap_or_default();
+        if used.iter().all(|&crowd| crowd <= CROWD) {
+            accumulate(used);
             distribute(keys, scratch, &mut starts, shift);
-            for (key, sorted) in keys.iter_mut().zip(scratch) {
-                *key = *sorted;
-            }
-            insert(keys);
+            insert(scratch, keys);
             return;
         }
     }
@@ -65,7 +63,7 @@ fn count(keys: &[Key], shift: u32) -> [u16; DIGITS] {
 }
 
 /// Counts become the places where each digit starts.
-fn accumulate(counts: &mut [u16; DIGITS]) {
+fn accumulate(counts: &mut [u16]) {
     let mut start = 0;
     for count in counts {
         (*count, start) = (start, start + *count);
@@ -82,19 +80,57 @@ fn distribute(from: &[Key], to: &mut [Key], starts: &mut [u16; DIGITS], shift: u
     }
 }
 
-fn insert(keys: &mut [Key]) {
-    for end in 1..keys.len() {
-        let Some(&key) = keys.get(end) else { return };
+/// Insertion sort: `from` is nearly sorted.
+fn insert(from: &[Key], to: &mut [Key]) {
+    for (end, &key) in from.iter().enumerate() {
         let mut at = end;
-        while at > 0
-            && let Some([before, place]) = keys.get_mut(at - 1..=at)
-            && *before > key
+        while let Some(before) = at.checked_sub(1)
+            && let Some(&[other, _]) = to.get(before..=at)
+            && other > key
         {
-            *place = *before;
-            at -= 1;
+            if let Some(place) = to.get_mut(at) {
+                *place = other;
+            }
+            at = before;
         }
-        if let Some(place) = keys.get_mut(at) {
+        if let Some(place) = to.get_mut(at) {
             *place = key;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 900 keys of a generator, with these spans, in the order of their numbers.
+    fn keys(width: u64, height: u64) -> [Key; 900] {
+        let mut state = width ^ height << 24;
+        let mut next = |span: u64| {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 33) % (span + 1)
+        };
+        let mut keys = core::array::from_fn(|number| Key(Key::at(next(width), next(height)).0 | number as u64));
+        keys[0] = Key::at(width, height);
+        keys
+    }
+
+    #[test]
+    fn sorted_whatever_the_span_and_the_number() {
+        const WIDEST: u64 = (1 << 24) - 2;
+        let mut scratch = [Key::NONE; 900];
+        for width in [0, 1, 255, 256, 10_239, WIDEST] {
+            for height in [0, 1, 7, 255, 256, 7_679, WIDEST] {
+                for count in [0, 1, 2, 3, 15, 16, 17, 47, 64, 65, 200, 255, 256, 511, FEW, FEW + 1, 900] {
+                    let mut sorted = keys(width, height);
+                    let sorted = &mut sorted[..count];
+                    let mut expected = keys(width, height);
+                    let expected = &mut expected[..count];
+                    expected.sort_unstable();
+                    sort(sorted, &mut scratch, width, height);
+                    assert_eq!(sorted, expected, "{width} x {height}");
+                }
+            }
         }
     }
 }

@@ -13,6 +13,7 @@
 
 mod device;
 mod enroll;
+mod nest;
 mod outcome;
 mod recognize;
 #[cfg_attr(target_os = "none", path = "start_bare.rs")]
@@ -58,6 +59,9 @@ fn run(device: &mut Device) -> Result<Outcome, Failure> {
         return Err(Failure::Views);
     }
     see(device, &mut features)?;
+    if !nest::nest(features.view())? {
+        return Err(Failure::Nesting);
+    }
     enroll::enroll(features.view(), device.table())?;
     #[cfg(feature = "control")]
     assert!(features.view().len() < 300, "the control has a panic path");

@@ -1,5 +1,6 @@
 //! What a round gave.
 
+use daymark_core::geometry::GeometryError;
 use daymark_core::image::FrameError;
 use daymark_core::table::{EncodeError, StreamError, TableError};
 
@@ -31,12 +32,22 @@ pub enum Failure {
     Stream,
     /// Writing the table.
     Encode(EncodeError),
+    /// The points for hulls.
+    Geometry(GeometryError),
+    /// The layers of hulls are not what they should be.
+    Nesting,
     /// The frame shows nothing.
     Blank,
     /// The flash pages are full.
     Full,
     /// The geometry of views is wrong.
     Views,
+}
+
+impl From<GeometryError> for Failure {
+    fn from(error: GeometryError) -> Self {
+        Self::Geometry(error)
+    }
 }
 
 impl From<FrameError> for Failure {
