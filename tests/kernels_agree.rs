@@ -144,7 +144,7 @@ fn responses(kernels: &dyn Kernels, rows: &[&[u8]]) -> (Vec<[Vec<i32>; 3]>, Vec<
         .windows(3)
         .map(|three| {
             let mut flags = vec![9; columns];
-            kernels.peak_flags([&three[0], &three[1], &three[2]], &mut flags);
+            kernels.peak_flags([&three[0], &three[1], &three[2]], f32::from_bits(1), &mut flags);
             flags
         })
         .collect();

@@ -136,9 +136,9 @@ impl<const STRIP: usize, const SLOTS: usize> CornerDetector<STRIP, SLOTS> {
             let [up, middle, down] =
                 [near[2], near[3], near[4]].map(|row| row.get(outer..columns - outer).unwrap_or(&[]));
             let Some(flags) = self.flags.get_mut(..middle.len()) else { continue };
-            kernels.peak_flags([up, middle, down], flags);
             let spread = &mut self.spread;
             spread.start_row(row);
+            kernels.peak_flags([up, middle, down], spread.least(first, end), flags);
             each_marked(flags, |at| {
                 let at = at + outer;
                 let Some(&response) = near[3].get(at) else { return };
@@ -254,6 +254,14 @@ impl<const SLOTS: usize> Spread<SLOTS> {
     #[inline]
     fn cell(&self, column: usize) -> usize {
         self.cell_row + ((column * self.per_column) >> 16).min(CELLS_X - 1)
+    }
+
+    /// Peaks of less than this are certain to be dropped in the columns `first..end`; positive.
+    fn least(&self, first: usize, end: usize) -> f32 {
+        let cells = self.floors.get(self.cell(first)..=self.cell(end - 1)).unwrap_or(&[]);
+        let floor = cells.iter().fold(u32::MAX, |least, &floor| least.min(floor));
+        // The least positive number where a cell has room.
+        f32::from_bits(floor.max(1))
     }
 
     /// Whether a peak of this response is certain to be dropped.

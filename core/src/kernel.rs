@@ -49,8 +49,8 @@ pub trait Kernels {
         response_row(rows, out);
     }
     /// See [`peak_flags`].
-    fn peak_flags(&self, rows: [&[f32]; 3], flags: &mut [u8]) {
-        peak_flags(rows, flags);
+    fn peak_flags(&self, rows: [&[f32]; 3], least: f32, flags: &mut [u8]) {
+        peak_flags(rows, least, flags);
     }
     /// See [`box_sums`].
     fn box_sums(&self, patch: &Patch, sums: &mut BoxSums) {
@@ -223,10 +223,10 @@ fn smoothed_columns([r0, r1, r2, r3, r4]: [&[i32]; 5]) -> impl Iterator<Item = f
     columns.map(|((((p0, p1), p2), p3), p4)| binomial([*p0, *p1, *p2, *p3, *p4]) as f32)
 }
 
-/// Marks possible peaks of the middle row with 1: positive, above the left and upper neighbour, not below the right
+/// Marks possible peaks of the middle row with 1: `least` or more, above the left and upper neighbour, not below the right
 /// and lower one. The first and last column are not marked.
 #[inline(always)]
-pub fn peak_flags(rows: [&[f32]; 3], flags: &mut [u8]) {
+pub fn peak_flags(rows: [&[f32]; 3], least: f32, flags: &mut [u8]) {
     let [up, mid, down] = rows;
     let n = flags.len().min(up.len()).min(mid.len()).min(down.len());
     if n < 2 {
@@ -245,7 +245,7 @@ pub fn peak_flags(rows: [&[f32]; 3], flags: &mut [u8]) {
     };
     let horizontal = left.iter().zip(centre).zip(right);
     for ((((&left, &centre), &right), (&up, &down)), flag) in horizontal.zip(up.iter().zip(down)).zip(inside) {
-        let peak = (centre > 0.0) & (centre > left) & (centre >= right) & (centre > up) & (centre >= down);
+        let peak = (centre >= least) & (centre > left) & (centre >= right) & (centre > up) & (centre >= down);
         *flag = u8::from(peak);
     }
     for edge in [0, n - 1] {

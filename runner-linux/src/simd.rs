@@ -109,7 +109,7 @@ macro_rules! all_kernels {
             tone_row(row: &[u8], out: &mut [u8]);
             gradient_row(rows: [&[u8]; 3], out: [&mut [i16]; 2]);
             response_row(rows: [[&[i32]; 3]; 5], out: &mut [f32]);
-            peak_flags(rows: [&[f32]; 3], flags: &mut [u8]);
+            peak_flags(rows: [&[f32]; 3], least: f32, flags: &mut [u8]);
             box_sums(patch: &Patch, sums: &mut BoxSums);
             distances(signature: Signature, others: &[Signature], out: &mut [u8]);
             count_below(values: &[u8], limit: u8) -> u32;
