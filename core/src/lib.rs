@@ -64,6 +64,7 @@
 #![forbid(unsafe_code)]
 
 pub mod math;
+mod heap;
 pub mod point;
 pub mod profile;
 pub mod feature;
