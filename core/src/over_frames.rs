@@ -160,6 +160,11 @@ impl<const TRACKS: usize> EvidenceOverFrames<TRACKS> {
         self.tracks.iter().flatten().find(|track| track.landmark == landmark).map(Track::belief)
     }
 
+    /// The landmarks that are followed.
+    pub fn followed(&self) -> impl Iterator<Item = u32> {
+        self.tracks.iter().flatten().map(|track| track.landmark).chain(self.standing())
+    }
+
     /// The landmark with the most evidence; of equals, the smaller number.
     pub fn best(&self) -> Option<Belief> {
         let better = |a: Belief, b: Belief| (b.evidence, a.landmark) > (a.evidence, b.landmark);
@@ -249,7 +254,8 @@ impl<const TRACKS: usize> EvidenceOverFrames<TRACKS> {
         let passes = |belief: &Belief| belief.evidence > 0 && belief.false_answer() <= self.limit;
         let best = self.best().filter(passes);
         let rival = best.is_some_and(|best| {
-            let others = self.tracks.iter().flatten().filter(|other| other.supported && other.landmark != best.landmark);
+            let others =
+                self.tracks.iter().flatten().filter(|other| other.supported && other.landmark != best.landmark);
             others.map(Track::belief).filter(passes).any(|other| best.evidence - other.evidence < AMBIGUOUS_WITHIN)
         });
         let end = |withdrawn, given: Option<Belief>| Change { withdrawn, given };
@@ -290,8 +296,9 @@ fn supported(recognition: &Recognition) -> [Option<&Answer>; 2] {
     let best = recognition.best.as_ref();
     let runner_up = match (&recognition.verdict, best, recognition.runner_up.as_ref()) {
         (Verdict::Ambiguous(..), _, runner_up) => runner_up,
-        (_, Some(best), Some(other)) => Some(other)
-            .filter(|other| best.matched.evidence.saturating_sub(other.matched.evidence) < AMBIGUOUS_WITHIN),
+        (_, Some(best), Some(other)) => {
+            Some(other).filter(|other| best.matched.evidence.saturating_sub(other.matched.evidence) < AMBIGUOUS_WITHIN)
+        }
         _ => None,
     };
     [best, runner_up]

@@ -76,15 +76,6 @@ impl<'a> LandmarkTable<'a> {
         Ok(self)
     }
 
-    /// The same table, taken as verified: for bytes that the program has verified before and kept, as when one thread
-    /// checks a table that another will use. With other bytes it is as with bytes that change: see
-    /// [`verified`](Self::verified).
-    #[must_use]
-    pub const fn verified_before(mut self) -> Self {
-        self.verified = true;
-        self
-    }
-
     /// Reads every view, and accepts the table or says what is wrong with the first record that is.
     ///
     /// # Errors

@@ -9,6 +9,7 @@ pub mod enroll;
 pub mod evaluate;
 pub mod recognize;
 pub mod table;
+pub mod watch;
 
 use std::error::Error;
 use std::io::{self, Write};
@@ -39,6 +40,8 @@ enum Command {
     Evaluate(evaluate::Args),
     /// Time the stages of recognition on this machine
     Bench(bench::Args),
+    /// Watch a camera, a pipe or a folder, and say what is seen for as long as it is seen
+    Watch(watch::Args),
 }
 
 /// How a command ended, if not by an error.
@@ -75,6 +78,7 @@ impl Cli {
             Command::Table(args) => table::run(&args),
             Command::Evaluate(args) => evaluate::run(&args),
             Command::Bench(args) => bench::run(&args),
+            Command::Watch(args) => watch::run(&args),
         }
     }
 }
