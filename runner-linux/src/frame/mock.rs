@@ -128,7 +128,7 @@ impl Mock {
             by_frame.entry(*at).or_default().push_back(*mishap);
         }
         let closed = VecDeque::new();
-        let shared = Shared { source: None, planned: by_frame, next: 0, closed, clock_ms: 0 };
+        let shared = Shared { source: None, planned: by_frame, next: 0, closed, clock_ms: 10 * HOUR_MS };
         Self { inner, shared: Arc::new(Mutex::new(shared)) }
     }
 }
