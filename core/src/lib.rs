@@ -13,6 +13,8 @@
 //!     refine      guided rounds, homography    evidence    bits for and against
 //!                                                                                │
 //!                                                        matcher ── recognizer ── verdict
+//!                                                                                │ frame after frame
+//!                                                                           over_frames
 //! ```
 //!
 //! Foundations: [`math`] (the only caller of `libm`), [`point`] (frames of reference), [`profile`], [`kernel`] (the inner
@@ -97,4 +99,5 @@ pub mod table;
 
 pub mod verdict;
 pub mod recognizer;
+pub mod over_frames;
 pub mod capacity;

@@ -66,6 +66,24 @@ impl FalseAnswer {
         Self { log2_q8: log2.clamp(-f64::from(1 << 20), 0.0) as i32 }
     }
 
+    /// `-log2 p` in 1/160 bit, as evidence is counted; 0 for a certainly false answer.
+    pub const fn surprise(self) -> i32 {
+        // 160 / 256; at most 2^20 * 5 fits.
+        -self.log2_q8 * 5 / 8
+    }
+
+    /// The probability `2^-surprise`, with the surprise in 1/160 bit; 1 for a surprise of 0 and less.
+    pub const fn of_surprise(surprise: i32) -> Self {
+        let log2 = -(surprise as i64) * 8 / 5;
+        if log2 > 0 {
+            Self::CERTAIN
+        } else if log2 < -(1 << 20) {
+            Self { log2_q8: -(1 << 20) }
+        } else {
+            Self { log2_q8: log2 as i32 }
+        }
+    }
+
     /// The probability, 0..=1.
     pub fn probability(self) -> f64 {
         exp2(f64::from(self.log2_q8) / 256.0)

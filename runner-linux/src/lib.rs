@@ -5,6 +5,7 @@
 //!  picture ─── enroll ─────── table_file        pictures become views of a table
 //!  picture ─── engine ─────── report            frames become answers, and answers text, JSON and drawings
 //!  dataset ─── command::evaluate                how often that is right
+//!  frame ───── watch ──────── output            a camera becomes answers that stand until they are withdrawn
 //! ```
 
 pub mod picture;
@@ -14,5 +15,8 @@ pub mod engine;
 pub mod enroll;
 pub mod table_file;
 pub mod dataset;
+pub mod frame;
 pub mod report;
+pub mod output;
+pub mod watch;
 pub mod command;

@@ -1,5 +1,7 @@
 //! A folder with pictures, and the real binary run in it.
 
+#![allow(dead_code, reason = "each test uses a part of it")]
+
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -131,6 +133,13 @@ impl Ran {
             assert!(self.stderr.contains(expected), "lacks {expected:?}: {self:#?}");
         }
         self
+    }
+
+    /// Exit 2 with the usage, because the arguments do not go together.
+    #[track_caller]
+    pub(crate) fn refused_by_the_parser(self, expected: &str) {
+        assert_eq!(self.code, Some(2), "{self:#?}");
+        assert!(self.stderr.contains(expected), "lacks {expected:?}: {self:#?}");
     }
 
     /// Standard output as one JSON document.

@@ -10,6 +10,7 @@ pub mod evaluate;
 pub mod recognize;
 pub mod study;
 pub mod table;
+pub mod watch;
 
 use std::error::Error;
 use std::io::{self, Write};
@@ -42,6 +43,8 @@ enum Command {
     Bench(bench::Args),
     /// Measure how well the parts work, on made scenes with known truth
     Study(study::Args),
+    /// Watch a camera, a pipe or a folder, and say what is seen for as long as it is seen
+    Watch(watch::Args),
 }
 
 /// How a command ended, if not by an error.
@@ -79,6 +82,7 @@ impl Cli {
             Command::Evaluate(args) => evaluate::run(&args),
             Command::Bench(args) => bench::run(&args),
             Command::Study(args) => study::run(&args),
+            Command::Watch(args) => watch::run(&args),
         }
     }
 }

@@ -1,0 +1,119 @@
+//! Whether a picture is good for anything: dark, blown out, empty and blurred frames are named as such.
+
+use serde::Serialize;
+
+use crate::picture::GrayImage;
+
+/// What a picture is like.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Quality {
+    /// Good enough to look at.
+    Good,
+    /// Nearly black.
+    Dark,
+    /// Nearly all of it white.
+    BlownOut,
+    /// Without any structure: fog, a covered lens.
+    Empty,
+    /// Structure, but no edges.
+    Blurred,
+}
+
+impl Quality {
+    /// All of them.
+    pub const ALL: [Self; 5] = [Self::Good, Self::Dark, Self::BlownOut, Self::Empty, Self::Blurred];
+
+    /// Its name, as in the JSON.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Good => "good",
+            Self::Dark => "dark",
+            Self::BlownOut => "blown_out",
+            Self::Empty => "empty",
+            Self::Blurred => "blurred",
+        }
+    }
+
+    /// What a person says.
+    pub const fn phrase(self) -> &'static str {
+        match self {
+            Self::Good => "the picture is good",
+            Self::Dark => "the picture is too dark",
+            Self::BlownOut => "the picture is blown out",
+            Self::Empty => "the picture is empty",
+            Self::Blurred => "the picture is blurred",
+        }
+    }
+
+    /// What helps.
+    pub const fn advice(self) -> &'static str {
+        match self {
+            Self::Good => "nothing to do",
+            Self::Dark => "more light, a longer exposure or more gain",
+            Self::BlownOut => "a shorter exposure or less gain",
+            Self::Empty => "see that nothing covers the lens",
+            Self::Blurred => "clean and focus the lens, or shorten the exposure if the camera moves",
+        }
+    }
+}
+
+/// A gray level below this is black.
+const BLACK: u8 = 24;
+/// A gray level from this on is white.
+const WHITE: u8 = 250;
+/// Mean distance from the mean, in gray levels, below which there is nothing to see.
+const EMPTY: u64 = 3;
+/// Pixels between the ends of a long step; a short one is 1 px.
+const LONG: usize = 6;
+/// A long step of so many gray levels is an edge.
+const EDGE: u8 = 24;
+
+/// Judges a frame of about 640 px, from every other row.
+///
+/// *Blurred* is measured on edges: where the gray level changes by [`EDGE`] or more within [`LONG`] px, how much of that
+/// does the steepest single step take? All of it at a sharp edge, a sixth on a ramp. The mean over the strongest eighth
+/// of the edges must be above 0.34; flat parts and noise have no say in it. `docs/watch.md` gives the measured values.
+pub fn quality(frame: &GrayImage) -> Quality {
+    let rows = || frame.pixels.chunks_exact(frame.width.max(1)).step_by(2);
+    let count = rows().map(|row| row.len() as u64).sum::<u64>().max(1);
+    let total = |value: &dyn Fn(u8) -> u64| rows().flatten().map(|&gray| value(gray)).sum::<u64>();
+    let white = total(&|gray| u64::from(gray >= WHITE));
+    let black = total(&|gray| u64::from(gray < BLACK));
+    let mean = total(&u64::from) / count;
+    let spread = total(&|gray| u64::from(gray).abs_diff(mean)) / count;
+    if black * 20 >= count * 19 {
+        return Quality::Dark;
+    }
+    if white * 4 >= count * 3 {
+        return Quality::BlownOut;
+    }
+    if spread < EMPTY {
+        return Quality::Empty;
+    }
+    // How sharp edges are, in 1/64, as a histogram.
+    let mut sharpness = [0_u32; 65];
+    for row in rows() {
+        for window in row.windows(LONG + 1).step_by(2) {
+            let long = window[0].abs_diff(window[LONG]);
+            if long >= EDGE {
+                let steepest = window.windows(2).map(|pair| pair[0].abs_diff(pair[1])).max().unwrap_or(0);
+                sharpness[usize::from(u16::from(steepest.min(long)) * 64 / u16::from(long))] += 1;
+            }
+        }
+    }
+    let edges: u32 = sharpness.iter().sum();
+    // A picture without edges is not called blurred: the corners will tell.
+    let strongest = edges / 8;
+    if strongest < 16 {
+        return Quality::Good;
+    }
+    let (mut left, mut sum) = (strongest, 0_u64);
+    for (value, &here) in sharpness.iter().enumerate().rev() {
+        let taken = here.min(left);
+        left -= taken;
+        sum += value as u64 * u64::from(taken);
+    }
+    let mean_64 = sum / u64::from(strongest);
+    if mean_64 < 22 { Quality::Blurred } else { Quality::Good }
+}
