@@ -4,6 +4,7 @@
 //! ```text
 //!  picture ─── enroll ─────── table_file        pictures become views of a table
 //!  picture ─── engine ─────── report            frames become answers, and answers text, JSON and drawings
+//!  picture ─── correspond                       which corner of one picture is which of another
 //!  dataset ─── command::evaluate                how often that is right
 //! ```
 
@@ -15,4 +16,5 @@ pub mod enroll;
 pub mod table_file;
 pub mod dataset;
 pub mod report;
+pub mod correspond;
 pub mod command;

@@ -4,6 +4,7 @@
 //! answer, 2 error.
 
 pub mod bench;
+pub mod correspond;
 pub mod demo;
 pub mod enroll;
 pub mod evaluate;
@@ -33,6 +34,8 @@ enum Command {
     Enroll(enroll::Args),
     /// Say which building of a table each picture shows, and how sure that is
     Recognize(recognize::Args),
+    /// Match the corners of two pictures, by their places alone
+    Correspond(correspond::Args),
     /// Look into, check, merge and change landmark tables
     Table(table::Args),
     /// Measure recall, false answers and time on a folder of pictures with a manifest
@@ -72,6 +75,7 @@ impl Cli {
             Command::Demo(args) => demo::run(&args),
             Command::Enroll(args) => enroll::run(&args),
             Command::Recognize(args) => recognize::run(&args),
+            Command::Correspond(args) => correspond::run(&args),
             Command::Table(args) => table::run(&args),
             Command::Evaluate(args) => evaluate::run(&args),
             Command::Bench(args) => bench::run(&args),
