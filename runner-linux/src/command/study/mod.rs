@@ -1,0 +1,28 @@
+//! `daymark study`: experiments that anybody can repeat; one a file.
+
+pub mod repeatability;
+
+use super::{CommandError, Outcome};
+
+/// Arguments of `daymark study`.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    #[command(subcommand)]
+    study: Study,
+}
+
+#[derive(Debug, clap::Subcommand)]
+enum Study {
+    /// How many automatic corners are found again, and how many are matched rightly by their places alone
+    Repeatability(repeatability::Args),
+}
+
+/// Runs the study that was asked for.
+///
+/// # Errors
+/// What kept it from being done.
+pub fn run(args: &Args) -> Result<Outcome, CommandError> {
+    match &args.study {
+        Study::Repeatability(args) => repeatability::run(args),
+    }
+}
