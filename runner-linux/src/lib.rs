@@ -4,6 +4,7 @@
 //! ```text
 //!  picture ─── enroll ─────── table_file        pictures become views of a table
 //!  picture ─── engine ─────── report            frames become answers, and answers text, JSON and drawings
+//!  picture ─── correspond                       which corner of one picture is which of another
 //!  dataset ─── command::evaluate                how often that is right
 //!  frame ───── watch ──────── output            a camera becomes answers that stand until they are withdrawn
 //! ```
@@ -19,4 +20,5 @@ pub mod frame;
 pub mod report;
 pub mod output;
 pub mod watch;
+pub mod correspond;
 pub mod command;

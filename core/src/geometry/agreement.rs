@@ -25,7 +25,7 @@ const ROUNDS_OF_PERSPECTIVE: usize = 8;
 /// Noise levels, as multiples of the expected one, at which the best map is tried.
 const NOISE_LEVELS: [f32; 3] = [1.0, 2.0, 3.0];
 /// Bits by which the best map must exceed the number of maps that could have been tried.
-const LEAST_BITS: f32 = 20.0;
+pub const LEAST_BITS: f32 = 20.0;
 /// Times the noise within which a growing homography looks for its next corners.
 const GROWING: f32 = 3.0;
 /// Ridge on the perspective terms, in normalized coordinates.

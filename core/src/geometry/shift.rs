@@ -13,7 +13,7 @@ use crate::math::log2;
 use crate::point::ImagePoint;
 
 /// A quad whose invariants are less certain than this (standard deviation of the logarithm) says little.
-const MOST_UNCERTAIN: f64 = 0.35;
+pub const MOST_UNCERTAIN: f64 = 0.35;
 
 /// Which of the vertices `k, k+1, ...` make a quad: four in a row, or five with one left out, so that a vertex that the
 /// other view lost does not break it.

@@ -4,6 +4,7 @@
 //! answer, 2 error.
 
 pub mod bench;
+pub mod correspond;
 pub mod demo;
 pub mod enroll;
 pub mod evaluate;
@@ -35,14 +36,16 @@ enum Command {
     Enroll(enroll::Args),
     /// Say which building of a table each picture shows, and how sure that is
     Recognize(recognize::Args),
+    /// Match the corners of two pictures, by their places alone
+    Correspond(correspond::Args),
     /// Look into, check, merge and change landmark tables
     Table(table::Args),
     /// Measure recall, false answers and time on a folder of pictures with a manifest
     Evaluate(evaluate::Args),
+    /// Repeat the experiments that the documents quote
+    Study(study::Args),
     /// Time the stages of recognition on this machine
     Bench(bench::Args),
-    /// Measure how well the parts work, on made scenes with known truth
-    Study(study::Args),
     /// Watch a camera, a pipe or a folder, and say what is seen for as long as it is seen
     Watch(watch::Args),
 }
@@ -78,6 +81,7 @@ impl Cli {
             Command::Demo(args) => demo::run(&args),
             Command::Enroll(args) => enroll::run(&args),
             Command::Recognize(args) => recognize::run(&args),
+            Command::Correspond(args) => correspond::run(&args),
             Command::Table(args) => table::run(&args),
             Command::Evaluate(args) => evaluate::run(&args),
             Command::Bench(args) => bench::run(&args),

@@ -10,7 +10,7 @@ use super::finding::{Finding, VerdictName};
 use super::phrase;
 use crate::picture::GrayImage;
 
-const MARGIN: f32 = 20.0;
+pub(crate) const MARGIN: f32 = 20.0;
 const HEAD: f32 = 92.0;
 const FOOT: f32 = 40.0;
 /// Connecting lines, at most: the strongest corners.
@@ -20,11 +20,11 @@ const LEAST_SIDE: f32 = 560.0;
 /// The narrowest picture into which the caption fits.
 const LEAST_WIDTH: f32 = 640.0;
 
-pub(super) const NIGHT: &str = "#0e1420";
-const PANEL: &str = "#182131";
-pub(super) const INK: &str = "#eef2f8";
-pub(super) const PALE: &str = "#9fb0c8";
-const FONT: &str = "system-ui, 'Segoe UI', 'Helvetica Neue', 'DejaVu Sans', sans-serif";
+pub(crate) const NIGHT: &str = "#0e1420";
+pub(crate) const PANEL: &str = "#182131";
+pub(crate) const INK: &str = "#eef2f8";
+pub(crate) const PALE: &str = "#9fb0c8";
+pub(crate) const FONT: &str = "system-ui, 'Segoe UI', 'Helvetica Neue', 'DejaVu Sans', sans-serif";
 
 /// What is drawn.
 #[derive(Debug, Clone, Copy)]
@@ -62,16 +62,16 @@ pub(super) const fn verdict_colour(verdict: VerdictName) -> &'static str {
 
 /// Where a picture stands in the drawing, and how large.
 #[derive(Debug, Clone, Copy)]
-struct Place {
-    x: f32,
-    y: f32,
-    width: f32,
-    height: f32,
-    scale: f32,
+pub(crate) struct Place {
+    pub(crate) x: f32,
+    pub(crate) y: f32,
+    pub(crate) width: f32,
+    pub(crate) height: f32,
+    pub(crate) scale: f32,
 }
 
 impl Place {
-    fn point(self, [x, y]: [f32; 2]) -> [f32; 2] {
+    pub(crate) fn point(self, [x, y]: [f32; 2]) -> [f32; 2] {
         // A point of an image counts from the centre of its first pixel.
         [self.x + (x + 0.5) * self.scale, self.y + (y + 0.5) * self.scale]
     }
@@ -158,7 +158,7 @@ pub(super) fn caption(finding: &Finding) -> (String, String) {
     }
 }
 
-pub(super) fn line_of_text(text: &str, x: f32, y: f32, size: f32, colour: &str) -> Text {
+pub(crate) fn line_of_text(text: &str, x: f32, y: f32, size: f32, colour: &str) -> Text {
     Text::new(phrase::printable(text))
         .set("x", format!("{x:.1}"))
         .set("y", format!("{y:.1}"))
@@ -166,7 +166,7 @@ pub(super) fn line_of_text(text: &str, x: f32, y: f32, size: f32, colour: &str) 
         .set("fill", colour)
 }
 
-fn rectangle(place: Place) -> Rectangle {
+pub(crate) fn rectangle(place: Place) -> Rectangle {
     Rectangle::new()
         .set("x", format!("{:.1}", place.x))
         .set("y", format!("{:.1}", place.y))
@@ -174,7 +174,7 @@ fn rectangle(place: Place) -> Rectangle {
         .set("height", format!("{:.1}", place.height))
 }
 
-fn picture(place: Place, address: String) -> Image {
+pub(crate) fn picture(place: Place, address: String) -> Image {
     Image::new()
         .set("x", format!("{:.1}", place.x))
         .set("y", format!("{:.1}", place.y))
@@ -184,11 +184,11 @@ fn picture(place: Place, address: String) -> Image {
         .set("href", address)
 }
 
-fn circle([x, y]: [f32; 2], radius: f32) -> Circle {
+pub(crate) fn circle([x, y]: [f32; 2], radius: f32) -> Circle {
     Circle::new().set("cx", format!("{x:.1}")).set("cy", format!("{y:.1}")).set("r", format!("{radius:.1}"))
 }
 
-fn segment([x1, y1]: [f32; 2], [x2, y2]: [f32; 2]) -> Line {
+pub(crate) fn segment([x1, y1]: [f32; 2], [x2, y2]: [f32; 2]) -> Line {
     Line::new()
         .set("x1", format!("{x1:.1}"))
         .set("y1", format!("{y1:.1}"))

@@ -148,7 +148,11 @@ struct Report {
     no_answer_from_degree: Option<u32>,
 }
 
-pub(super) fn run(args: &Args) -> Result<Outcome, CommandError> {
+/// Runs the study.
+///
+/// # Errors
+/// A tower whose corners do not fit, or a closed output.
+pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     let tower = &Tower::eight()[args.tower as usize - 1];
     let base = view(tower, REFERENCE_ANGLE);
     let seed = |line: usize, case: u64| args.first_seed.wrapping_add(line as u64 * SEEDS_A_LINE).wrapping_add(case);

@@ -1,26 +1,32 @@
-//! `daymark study`: how well the parts work, measured on made scenes with known truth; one study a file.
+//! `daymark study`: experiments that anybody can repeat, on made scenes with known truth; one a file.
 
 pub mod correspondence;
-
-use clap::{Args as ClapArgs, Subcommand};
+pub mod repeatability;
 
 use super::{CommandError, Outcome};
 
 /// Arguments of `daymark study`.
-#[derive(Debug, ClapArgs)]
+#[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(subcommand)]
     study: Study,
 }
 
-#[derive(Debug, Subcommand)]
+#[derive(Debug, clap::Subcommand)]
 enum Study {
-    /// How many corners are matched, and how many wrongly, by their places alone
+    /// How many hand-picked corners are matched, and how many wrongly, by their places alone
     Correspondence(correspondence::Args),
+    /// How many automatic corners are found again, and how many are matched rightly by their places alone
+    Repeatability(repeatability::Args),
 }
 
-pub(super) fn run(args: &Args) -> Result<Outcome, CommandError> {
+/// Runs the study that was asked for.
+///
+/// # Errors
+/// What kept it from being done.
+pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     match &args.study {
         Study::Correspondence(args) => correspondence::run(args),
+        Study::Repeatability(args) => repeatability::run(args),
     }
 }
