@@ -10,7 +10,7 @@ use daymark::table_file::{LandmarkEntry, OwnedTable, ViewEntry};
 use daymark::with_kernels;
 use daymark_core::feature::Signature;
 use daymark_core::kernel::{
-    BoxSums, Kernels, LANES, LookAlikes, PATCH, PATCH_STRIDE, Portable, Search, Seed, VoteColumns,
+    BoxSums, Kernels, LANES, LookAlikes, PATCH, PATCH_STRIDE, Portable, Search, Seed, VoteColumns, places,
 };
 use daymark_core::profile::Profile;
 use daymark_core::table::{Kind, LandmarkTable};
@@ -123,10 +123,11 @@ fn responses(kernels: &dyn Kernels, rows: &[&[u8]]) -> (Vec<[Vec<i32>; 3]>, Vec<
     let tensor: Vec<[Vec<i32>; 3]> = rows
         .windows(3)
         .map(|rows| {
-            let mut products = [0; 3].map(|_| vec![0; columns + 4]);
+            let mut gradients = [0; 2].map(|_| vec![0; columns + 4]);
+            kernels.gradient_row([rows[0], rows[1], rows[2]], gradients.each_mut().map(Vec::as_mut_slice));
             let mut out = [0; 3].map(|_| vec![0; columns]);
             let slices = out.each_mut().map(Vec::as_mut_slice);
-            kernels.structure_row([rows[0], rows[1], rows[2]], products.each_mut().map(Vec::as_mut_slice), slices);
+            kernels.tensor_row(gradients.each_ref().map(Vec::as_slice), slices);
             out
         })
         .collect();
@@ -143,7 +144,7 @@ fn responses(kernels: &dyn Kernels, rows: &[&[u8]]) -> (Vec<[Vec<i32>; 3]>, Vec<
         .windows(3)
         .map(|three| {
             let mut flags = vec![9; columns];
-            kernels.peak_flags([&three[0], &three[1], &three[2]], &mut flags);
+            kernels.peak_flags([&three[0], &three[1], &three[2]], f32::from_bits(1), &mut flags);
             flags
         })
         .collect();
@@ -200,8 +201,9 @@ fn rows_of_distances() {
 /// What is asked of a row of distances.
 fn searches(kernels: &dyn Kernels, row: &[u8]) -> Vec<(u32, Vec<usize>, [u8; 3], [u16; 3])> {
     let search = |limit| {
-        let mut places = Vec::new();
-        kernels.each_at_most(row, limit, &mut |place| places.push(place));
+        let mut marks = vec![0; row.len().div_ceil(64)];
+        kernels.marks_at_most(row, limit, &mut marks);
+        let places = places(&marks).collect();
         let nearest = kernels.nearest_three(row, limit);
         (kernels.count_below(row, limit), places, nearest.distances, nearest.places)
     };

@@ -4,6 +4,7 @@ use heapless::Vec;
 
 use crate::extract::Features;
 use crate::feature::COMMONNESS;
+use crate::heap;
 use crate::kernel::{Kernels, NUMBER_BITS, VoteColumns};
 use crate::model::SURPRISE;
 use crate::pyramid::scale;
@@ -131,7 +132,7 @@ impl<const CANDIDATES: usize> Candidates<CANDIDATES> {
                 }
             }
         }
-        sort_heap(&mut self.order);
+        heap::sort(&mut self.order);
         self.fill_columns(stored, query);
     }
 
@@ -202,63 +203,16 @@ const QUERY_LAST: u32 = (1 << NUMBER_BITS) - 1;
 const _: () = assert!(((MOST_BITS * GAIN_UNIT) as u64) < 1 << (u32::BITS - STORED_BITS - NUMBER_BITS));
 
 /// A heap with the smallest key on top, which the next larger one replaces when the heap is full.
-fn keep_largest<const N: usize>(heap: &mut Vec<u32, N>, key: u32) {
-    if heap.push(key).is_ok() {
-        let mut child = heap.len() - 1;
-        while child > 0 {
-            let parent = (child - 1) / 2;
-            if !swap_if(heap, parent, child, |parent, child| parent > child) {
-                break;
-            }
-            child = parent;
-        }
-    } else if let Some(top) = heap.first_mut()
+fn keep_largest<const N: usize>(largest: &mut Vec<u32, N>, key: u32) {
+    if largest.push(key).is_ok() {
+        heap::sift_up(largest);
+    } else if let Some(top) = largest.first_mut()
         && *top < key
     {
         *top = key;
-        let end = heap.len();
-        sift_down(heap, end);
+        let end = largest.len();
+        heap::sift_down(largest, end);
     }
-}
-
-/// Restores the heap below its top within the first `end` elements.
-fn sift_down(heap: &mut [u32], end: usize) {
-    let mut parent = 0;
-    loop {
-        let (left, right) = (2 * parent + 1, 2 * parent + 2);
-        let at = |i: usize| if i < end { heap.get(i).copied() } else { None };
-        let child = match (at(left), at(right)) {
-            (Some(l), Some(r)) if r < l => right,
-            (Some(_), _) => left,
-            (None, _) => return,
-        };
-        if !swap_if(heap, parent, child, |parent, child| parent > child) {
-            return;
-        }
-        parent = child;
-    }
-}
-
-/// Turns the heap into a list, largest first.
-fn sort_heap(heap: &mut [u32]) {
-    for end in (1..heap.len()).rev() {
-        swap_if(heap, 0, end, |_, _| true);
-        sift_down(heap, end);
-    }
-}
-
-fn swap_if(heap: &mut [u32], a: usize, b: usize, wanted: impl Fn(u32, u32) -> bool) -> bool {
-    let (Some(&at_a), Some(&at_b)) = (heap.get(a), heap.get(b)) else { return false };
-    if !wanted(at_a, at_b) {
-        return false;
-    }
-    if let Some(slot) = heap.get_mut(a) {
-        *slot = at_b;
-    }
-    if let Some(slot) = heap.get_mut(b) {
-        *slot = at_a;
-    }
-    true
 }
 
 #[cfg(test)]

@@ -5,8 +5,9 @@
 //! cell may contribute before every cell had its turn, so that one tree does not take all corners. No absolute
 //! threshold: dark frames work.
 
+use crate::heap;
 use crate::image::GrayView;
-use crate::kernel::{Kernels, marked};
+use crate::kernel::{Kernels, each_marked};
 use crate::point::SUBPIXEL;
 use crate::response::{REACH, RESPONSE_ROWS, ResponseRows};
 
@@ -59,6 +60,10 @@ impl Peak {
         let flipped = |p: usize| 0xfff - (p as u64 & 0xfff);
         let place = flipped(row) << 20 | flipped(column) << 8 | u64::from(dx & 15) << 4 | u64::from(dy & 15);
         Self(u64::from(response.to_bits()) << 32 | place)
+    }
+
+    const fn response_bits(self) -> u32 {
+        (self.0 >> 32) as u32
     }
 
     fn corner(self) -> LevelCorner {
@@ -126,21 +131,24 @@ impl<const STRIP: usize, const SLOTS: usize> CornerDetector<STRIP, SLOTS> {
             }
             let Some(near) = self.rows.neighbourhood() else { continue };
             let row = latest - BORDER;
-            let Some(flags) = self.flags.get_mut(..columns) else { continue };
-            kernels.peak_flags([near[2], near[3], near[4]], flags);
-            // The outer columns belong to the neighbouring strips.
-            flags.iter_mut().take(PEAK_REACH).for_each(|flag| *flag = 0);
-            flags.iter_mut().rev().take(PEAK_REACH).for_each(|flag| *flag = 0);
-            self.spread.start_row(row);
-            for at in marked(flags) {
-                let Some(&response) = near[3].get(at) else { continue };
+            // The outer columns belong to the neighbouring strips; the kernel leaves out one on either side.
+            let outer = PEAK_REACH - 1;
+            let [up, middle, down] =
+                [near[2], near[3], near[4]].map(|row| row.get(outer..columns - outer).unwrap_or(&[]));
+            let Some(flags) = self.flags.get_mut(..middle.len()) else { continue };
+            let spread = &mut self.spread;
+            spread.start_row(row);
+            kernels.peak_flags([up, middle, down], spread.least(first, end), flags);
+            each_marked(flags, |at| {
+                let at = at + outer;
+                let Some(&response) = near[3].get(at) else { return };
                 let column = first + at - PEAK_REACH;
-                let cell = self.spread.cell(column);
-                if self.spread.rejects(cell, response) || !is_peak(&near, at, response) {
-                    continue;
+                let cell = spread.cell(column);
+                if spread.rejects(cell, response) || !is_peak(&near, at, response) {
+                    return;
                 }
-                self.spread.push(cell, Peak::new(response, column, row, refine(&near, at)));
-            }
+                spread.push(cell, Peak::new(response, column, row, refine(&near, at)));
+            });
         }
     }
 }
@@ -151,19 +159,37 @@ impl<const STRIP: usize, const SLOTS: usize> Default for CornerDetector<STRIP, S
     }
 }
 
-/// Whether no response within 3 px is larger; equal ones count if they come earlier in raster order.
+/// Whether no response within 3 px is larger, of a place that is larger than its four neighbours; equal ones count if
+/// they come earlier in raster order.
 fn is_peak(near: &[&[f32]; RESPONSE_ROWS], at: usize, response: f32) -> bool {
-    near.iter().enumerate().all(|(y, row)| {
-        let Some(window) = row.get(at - PEAK_REACH..=at + PEAK_REACH) else { return false };
-        match y {
-            0..PEAK_REACH => window.iter().all(|&r| r < response),
-            PEAK_REACH => {
-                window.iter().enumerate().all(|(x, &r)| if x < PEAK_REACH { r < response } else { r <= response })
+    let larger = |a: f32, b: f32| if a > b { a } else { b };
+    // Seven columns are four and four, the middle one in both: side by side, and without a branch for each.
+    let largest_of = |rows: &[&[f32]]| {
+        let mut largest = [f32::MIN; 4];
+        for row in rows {
+            let Some(window) = row.get(at - PEAK_REACH..).and_then(|row| row.first_chunk::<WINDOW>()) else { continue };
+            let &[a, b, c, d, e, f, g] = window;
+            for (largest, (left, right)) in largest.iter_mut().zip([(a, d), (b, e), (c, f), (d, g)]) {
+                *largest = larger(*largest, larger(left, right));
             }
-            _ => window.iter().all(|&r| r <= response),
         }
-    })
+        largest.into_iter().fold(f32::MIN, larger)
+    };
+    let [above @ .., _, _, _, _] = near;
+    let [_, _, _, middle, below @ ..] = near;
+    let Some(&[a, b, _, _, _, f, g]) = middle.get(at - PEAK_REACH..).and_then(|row| row.first_chunk::<WINDOW>()) else {
+        return false;
+    };
+    (a < response)
+        & (b < response)
+        & (f <= response)
+        & (g <= response)
+        & (largest_of(above) < response)
+        & (largest_of(below) <= response)
 }
+
+/// Columns that the suppression looks at.
+const WINDOW: usize = 2 * PEAK_REACH + 1;
 
 /// The vertex of the parabola through three responses, along each axis, as `offset + 8` in 1/16 px.
 ///
@@ -186,13 +212,13 @@ fn refine(near: &[&[f32]; RESPONSE_ROWS], at: usize) -> [u8; 2] {
     ]
 }
 
-/// The strongest peaks of each cell.
+/// The strongest peaks of each cell, each a heap with the weakest on top until they are selected.
 #[derive(Debug, Clone)]
 struct Spread<const SLOTS: usize> {
     slots: [Peak; SLOTS],
     counts: [usize; CELLS],
-    /// The weakest kept peak of a full cell, and its slot; nothing below it is looked at.
-    floors: [(Peak, usize); CELLS],
+    /// The response of the weakest kept peak of a full cell, as bits; nothing below it is looked at.
+    floors: [u32; CELLS],
     per_cell: usize,
     /// `CELLS_X / width` and `CELLS_Y / height` in Q16.
     per_column: usize,
@@ -205,7 +231,7 @@ impl<const SLOTS: usize> Spread<SLOTS> {
         Self {
             slots: [Peak::NONE; SLOTS],
             counts: [0; CELLS],
-            floors: [(Peak::NONE, 0); CELLS],
+            floors: [0; CELLS],
             per_cell: 0,
             per_column: 0,
             per_row: 0,
@@ -215,7 +241,7 @@ impl<const SLOTS: usize> Spread<SLOTS> {
 
     fn start(&mut self, width: usize, height: usize, share: usize) {
         self.counts = [0; CELLS];
-        self.floors = [(Peak::NONE, 0); CELLS];
+        self.floors = [0; CELLS];
         self.per_cell = (KEPT_PER_SHARE * share).min(SLOTS / CELLS);
         self.per_column = (CELLS_X << 16) / width;
         self.per_row = (CELLS_Y << 16) / height;
@@ -230,10 +256,18 @@ impl<const SLOTS: usize> Spread<SLOTS> {
         self.cell_row + ((column * self.per_column) >> 16).min(CELLS_X - 1)
     }
 
+    /// Peaks of less than this are certain to be dropped in the columns `first..end`; positive.
+    fn least(&self, first: usize, end: usize) -> f32 {
+        let cells = self.floors.get(self.cell(first)..=self.cell(end - 1)).unwrap_or(&[]);
+        let floor = cells.iter().fold(u32::MAX, |least, &floor| least.min(floor));
+        // The least positive number where a cell has room.
+        f32::from_bits(floor.max(1))
+    }
+
     /// Whether a peak of this response is certain to be dropped.
     #[inline]
     fn rejects(&self, cell: usize, response: f32) -> bool {
-        self.floors.get(cell).is_some_and(|(floor, _)| u64::from(response.to_bits()) < floor.0 >> 32)
+        self.floors.get(cell).is_some_and(|&floor| response.to_bits() < floor)
     }
 
     fn push(&mut self, cell: usize, peak: Peak) {
@@ -246,20 +280,17 @@ impl<const SLOTS: usize> Spread<SLOTS> {
         if let Some(slot) = slots.get_mut(*count) {
             *slot = peak;
             *count += 1;
+            heap::sift_up(slots.get_mut(..*count).unwrap_or_default());
             if *count < kept {
                 return;
             }
-        } else if peak <= floor.0 {
-            return;
-        } else if let Some(slot) = slots.get_mut(floor.1) {
-            *slot = peak;
+        } else if let Some(weakest) = slots.first_mut()
+            && *weakest < peak
+        {
+            *weakest = peak;
+            heap::sift_down(slots, kept);
         }
-        *floor = slots.iter().enumerate().fold(
-            (Peak(u64::MAX), 0),
-            |weakest, (i, &peak)| {
-                if peak < weakest.0 { (peak, i) } else { weakest }
-            },
-        );
+        *floor = slots.first().map_or(u32::MAX, |weakest| weakest.response_bits());
     }
 
     fn select(&mut self, count: usize, share: usize, mut emit: impl FnMut(LevelCorner)) {
@@ -268,7 +299,7 @@ impl<const SLOTS: usize> Spread<SLOTS> {
             return;
         }
         for (cell, &count) in self.slots.chunks_exact_mut(kept).zip(&self.counts) {
-            sort_descending(cell.get_mut(..count).unwrap_or_default());
+            heap::sort(cell.get_mut(..count).unwrap_or_default());
         }
         let cells = || self.slots.chunks_exact(kept).zip(&self.counts).map(|(cell, &n)| cell.get(..n).unwrap_or(&[]));
         let first = |cell: &'_ [Peak]| cell.len().min(share);
@@ -288,33 +319,26 @@ impl<const SLOTS: usize> Spread<SLOTS> {
     }
 }
 
-/// The largest bound that at least `count` peaks reach, by bisection; the lists are sorted, strongest first. With
-/// fewer peaks every one reaches it; with `count = 0` none does.
+/// A bound that `count` peaks reach, by bisection; the lists are sorted, strongest first. With fewer peaks every one
+/// reaches it; with `count = 0` none does.
 fn threshold<'a>(lists: &(impl Iterator<Item = &'a [Peak]> + Clone), count: usize) -> Peak {
     if count == 0 {
         return Peak(u64::MAX);
     }
+    if lists.clone().map(<[Peak]>::len).sum::<usize>() <= count {
+        return Peak::NONE;
+    }
+    let strongest = lists.clone().filter_map(<[Peak]>::first).fold(Peak::NONE, |a, &b| a.max(b));
     let mut bound = 0;
-    for bit in (0..64).rev() {
+    for bit in (0..u64::BITS - strongest.0.leading_zeros()).rev() {
         let higher = bound | 1 << bit;
         let reached: usize = lists.clone().map(|list| list.partition_point(|peak| peak.0 >= higher)).sum();
-        if reached >= count {
+        if reached == count {
+            return Peak(higher);
+        }
+        if reached > count {
             bound = higher;
         }
     }
     Peak(bound)
-}
-
-/// Insertion sort: a cell keeps a few dozen peaks.
-fn sort_descending(peaks: &mut [Peak]) {
-    for end in 1..peaks.len() {
-        let mut at = end;
-        while at > 0
-            && let Some([before, after]) = peaks.get_mut(at - 1..=at)
-            && *before < *after
-        {
-            core::mem::swap(before, after);
-            at -= 1;
-        }
-    }
 }

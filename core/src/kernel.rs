@@ -36,17 +36,21 @@ pub trait Kernels {
     fn tone_row(&self, row: &[u8], out: &mut [u8]) {
         tone_row(row, out);
     }
-    /// See [`structure_row`].
-    fn structure_row(&self, rows: [&[u8]; 3], products: [&mut [i32]; 3], out: [&mut [i32]; 3]) {
-        structure_row(rows, products, out);
+    /// See [`gradient_row`].
+    fn gradient_row(&self, rows: [&[u8]; 3], out: [&mut [i16]; 2]) {
+        gradient_row(rows, out);
+    }
+    /// See [`tensor_row`].
+    fn tensor_row(&self, gradients: [&[i16]; 2], out: [&mut [i32]; 3]) {
+        tensor_row(gradients, out);
     }
     /// See [`response_row`].
     fn response_row(&self, rows: [[&[i32]; 3]; 5], out: &mut [f32]) {
         response_row(rows, out);
     }
     /// See [`peak_flags`].
-    fn peak_flags(&self, rows: [&[f32]; 3], flags: &mut [u8]) {
-        peak_flags(rows, flags);
+    fn peak_flags(&self, rows: [&[f32]; 3], least: f32, flags: &mut [u8]) {
+        peak_flags(rows, least, flags);
     }
     /// See [`box_sums`].
     fn box_sums(&self, patch: &Patch, sums: &mut BoxSums) {
@@ -60,9 +64,9 @@ pub trait Kernels {
     fn count_below(&self, values: &[u8], limit: u8) -> u32 {
         count_below(values, limit)
     }
-    /// See [`each_at_most`].
-    fn each_at_most(&self, values: &[u8], limit: u8, found: &mut dyn FnMut(usize)) {
-        each_at_most(values, limit, found);
+    /// See [`marks_at_most`].
+    fn marks_at_most(&self, values: &[u8], limit: u8, marks: &mut [u64]) {
+        marks_at_most(values, limit, marks);
     }
     /// See [`closest`].
     fn closest(&self, blocks: &[LookAlikes], search: Search) -> i32 {
@@ -149,31 +153,37 @@ const fn least(a: u8, b: u8) -> u8 {
     if a < b { a } else { b }
 }
 
-/// One row of the structure tensor, smoothed along the row.
-///
-/// `rows` are three neighbouring rows of n + 6 columns. 3 x 3 Sobel gradients (|g| <= 1,020) give the products
-/// `[gx gx, gy gy, gx gy]` in `products` (n + 4 columns); binomial 1-4-6-4-1 with `>> 4` gives `out` (n columns).
+/// One row of 3 x 3 Sobel gradients `[gx, gy]` (n columns, |g| <= 1,020) from three neighbouring rows of n + 2.
 #[inline(always)]
-pub fn structure_row(rows: [&[u8]; 3], products: [&mut [i32]; 3], out: [&mut [i32]; 3]) {
+pub fn gradient_row(rows: [&[u8]; 3], out: [&mut [i16]; 2]) {
     let [above, centre, below] = rows;
-    let [xx, yy, xy] = products;
+    let [gx, gy] = out;
     let edges = from(above, 0).zip(from(above, 2)).zip(from(below, 0)).zip(from(below, 2));
     let cross = from(centre, 0).zip(from(centre, 2)).zip(from(above, 1)).zip(from(below, 1));
-    let gradients = edges.zip(cross).map(|((((a0, a2), b0), b2), (((c0, c2), a1), b1))| {
+    for (((gx, gy), (((a0, a2), b0), b2)), (((c0, c2), a1), b1)) in gx.iter_mut().zip(gy).zip(edges).zip(cross) {
         let [a0, a1, a2, c0, c2, b0, b1, b2] = [a0, a1, a2, c0, c2, b0, b1, b2].map(|&pixel| i16::from(pixel));
-        [2 * (c2 - c0) + (a2 - a0) + (b2 - b0), 2 * (b1 - a1) + (b0 - a0) + (b2 - a2)]
-    });
-    let products = xx.iter_mut().zip(yy.iter_mut()).zip(xy.iter_mut());
-    for (((xx, yy), xy), [gx, gy]) in products.zip(gradients) {
-        let (gx, gy) = (i32::from(gx), i32::from(gy));
-        (*xx, *yy, *xy) = (gx * gx, gy * gy, gx * gy);
+        *gx = 2 * (c2 - c0) + (a2 - a0) + (b2 - b0);
+        *gy = 2 * (b1 - a1) + (b0 - a0) + (b2 - a2);
     }
-    for (products, out) in [xx, yy, xy].into_iter().zip(out) {
-        let outer = from(products, 0).zip(from(products, 4));
-        let inner = from(products, 1).zip(from(products, 2)).zip(from(products, 3));
-        for (((p0, p4), ((p1, p2), p3)), out) in outer.zip(inner).zip(out) {
-            *out = binomial([*p0, *p1, *p2, *p3, *p4]);
-        }
+}
+
+/// One row of the structure tensor, smoothed along the row: the products `[gx gx, gy gy, gx gy]` under a binomial
+/// 1-4-6-4-1 with `>> 4`. n columns from gradients of n + 4.
+#[inline(always)]
+pub fn tensor_row(gradients: [&[i16]; 2], out: [&mut [i32]; 3]) {
+    let ([gx, gy], [xx, yy, xy]) = (gradients, out);
+    smooth_products(gx, gx, xx);
+    smooth_products(gy, gy, yy);
+    smooth_products(gx, gy, xy);
+}
+
+#[inline(always)]
+fn smooth_products(a: &[i16], b: &[i16], out: &mut [i32]) {
+    let products = |start: usize| from(a, start).zip(from(b, start)).map(|(&a, &b)| i32::from(a) * i32::from(b));
+    let outer = products(0).zip(products(4));
+    let inner = products(1).zip(products(2)).zip(products(3));
+    for (((p0, p4), ((p1, p2), p3)), out) in outer.zip(inner).zip(out) {
+        *out = binomial([p0, p1, p2, p3, p4]);
     }
 }
 
@@ -213,10 +223,10 @@ fn smoothed_columns([r0, r1, r2, r3, r4]: [&[i32]; 5]) -> impl Iterator<Item = f
     columns.map(|((((p0, p1), p2), p3), p4)| binomial([*p0, *p1, *p2, *p3, *p4]) as f32)
 }
 
-/// Marks possible peaks of the middle row with 1: positive, above the left and upper neighbour, not below the right
+/// Marks possible peaks of the middle row with 1: `least` or more, above the left and upper neighbour, not below the right
 /// and lower one. The first and last column are not marked.
 #[inline(always)]
-pub fn peak_flags(rows: [&[f32]; 3], flags: &mut [u8]) {
+pub fn peak_flags(rows: [&[f32]; 3], least: f32, flags: &mut [u8]) {
     let [up, mid, down] = rows;
     let n = flags.len().min(up.len()).min(mid.len()).min(down.len());
     if n < 2 {
@@ -235,7 +245,7 @@ pub fn peak_flags(rows: [&[f32]; 3], flags: &mut [u8]) {
     };
     let horizontal = left.iter().zip(centre).zip(right);
     for ((((&left, &centre), &right), (&up, &down)), flag) in horizontal.zip(up.iter().zip(down)).zip(inside) {
-        let peak = (centre > 0.0) & (centre > left) & (centre >= right) & (centre > up) & (centre >= down);
+        let peak = (centre >= least) & (centre > left) & (centre >= right) & (centre > up) & (centre >= down);
         *flag = u8::from(peak);
     }
     for edge in [0, n - 1] {
@@ -297,41 +307,57 @@ pub struct Nearest {
     pub places: [u16; 3],
 }
 
-/// The three smallest values of at most `limit`, the first of equal ones first.
+/// The three smallest values of at most `limit`, the first of equal ones first. At most [`NUMBER_LIMIT`] `+ 1` values
+/// are looked at.
 #[inline(always)]
 pub fn nearest_three(row: &[u8], limit: u8) -> Nearest {
+    // Each lane keeps the three smallest of its values, as keys of value and chunk: no branches.
+    let mut smallest = [[u16::MAX; NEAREST_LANES]; 3];
+    let (chunks, rest) = row.as_chunks::<NEAREST_LANES>();
+    for (number, chunk) in (0..NEAREST_CHUNKS).zip(chunks) {
+        keep_three_smallest(&mut smallest, chunk, number);
+    }
+    if chunks.len() < usize::from(NEAREST_CHUNKS) {
+        keep_three_smallest(&mut smallest, rest, chunks.len() as u16);
+    }
     let mut nearest = Nearest { distances: [255; 3], places: [0; 3] };
-    let mut bound = limit;
-    for (number, chunk) in row.chunks(64).enumerate() {
-        for (group, mut marks) in at_most(chunk, bound).into_iter().enumerate() {
-            while marks != 0 {
-                let offset = group * 8 + marks.trailing_zeros() as usize / 8;
-                marks &= marks - 1;
-                let Some(&distance) = chunk.get(offset) else { break };
-                if distance > bound {
-                    continue;
-                }
-                let place = (number * 64 + offset) as u16;
-                let [d0, d1, d2] = nearest.distances;
-                let [p0, p1, _] = nearest.places;
-                if distance < d0 {
-                    nearest = Nearest { distances: [distance, d0, d1], places: [place, p0, p1] };
-                } else if distance < d1 {
-                    nearest = Nearest { distances: [d0, distance, d1], places: [p0, place, p1] };
-                } else if distance < d2 {
-                    nearest = Nearest { distances: [d0, d1, distance], places: [p0, p1, place] };
-                }
-                // Equal to the third does not enter.
-                bound = bound.min(nearest.distances[2].saturating_sub(1));
-            }
+    for (distance, place) in nearest.distances.iter_mut().zip(&mut nearest.places) {
+        let [first, second, third] = &mut smallest;
+        let mut best = u32::MAX;
+        for (lane, &key) in (0..).zip(first.iter()) {
+            let key = u32::from(key) << NEAREST_LANES.ilog2() | lane;
+            best = if key < best { key } else { best };
         }
+        if best >> NUMBER_BITS > u32::from(limit) {
+            break;
+        }
+        (*distance, *place) = ((best >> NUMBER_BITS) as u8, (best & NUMBER_LIMIT as u32) as u16);
+        let lane = best as usize % NEAREST_LANES;
+        (first[lane], second[lane], third[lane]) = (second[lane], third[lane], u16::MAX);
     }
     nearest
 }
 
-/// Marks the values of at most `limit` among the first 64: byte `b` of word `w` is 1 for value `8 w + b`.
+/// Values that [`nearest_three`] looks at side by side.
+const NEAREST_LANES: usize = 32;
+/// Chunks of as many values; a key of value and chunk has 16 bits.
+const NEAREST_CHUNKS: u16 = 1 << (NUMBER_BITS - NEAREST_LANES.ilog2());
+
 #[inline(always)]
-fn at_most(values: &[u8], limit: u8) -> [u64; 8] {
+fn keep_three_smallest(smallest: &mut [[u16; NEAREST_LANES]; 3], values: &[u8], number: u16) {
+    let [first, second, third] = smallest;
+    let lanes = first.iter_mut().zip(second).zip(third);
+    for (((first, second), third), &value) in lanes.zip(values) {
+        let key = u16::from(value) << NEAREST_CHUNKS.ilog2() | number;
+        let (a, larger) = (key.min(*first), key.max(*first));
+        let (b, larger) = (larger.min(*second), larger.max(*second));
+        (*first, *second, *third) = (a, b, larger.min(*third));
+    }
+}
+
+/// Which of the first 64 values are at most `limit`, a bit each.
+#[inline(always)]
+fn at_most(values: &[u8], limit: u8) -> u64 {
     let mut marks = [0; 64];
     if let Some(values) = values.first_chunk::<64>() {
         for (mark, &value) in marks.iter_mut().zip(values) {
@@ -342,43 +368,53 @@ fn at_most(values: &[u8], limit: u8) -> [u64; 8] {
             *mark = u8::from(value <= limit);
         }
     }
-    let mut words = [0; 8];
-    for (word, marks) in words.iter_mut().zip(marks.as_chunks::<8>().0) {
-        *word = u64::from_le_bytes(*marks);
+    bits(&marks)
+}
+
+/// Bit `i` is byte `i`, each 0 or 1.
+#[inline(always)]
+fn bits(marks: &[u8; 64]) -> u64 {
+    // The product has byte i at bit 56 + i; no two terms meet, so nothing carries.
+    let gathered = |eight: &[u8; 8]| u64::from_le_bytes(*eight).wrapping_mul(0x0102_0408_1020_4080) >> 56;
+    marks.as_chunks::<8>().0.iter().enumerate().fold(0, |bits, (number, eight)| bits | gathered(eight) << (8 * number))
+}
+
+/// Calls `found` with the places of the bytes that are 1; the others are 0.
+#[inline(always)]
+pub fn each_marked(marks: &[u8], mut found: impl FnMut(usize)) {
+    let (chunks, rest) = marks.as_chunks::<64>();
+    let mut padded = [0; 64];
+    for (padded, &mark) in padded.iter_mut().zip(rest) {
+        *padded = mark;
     }
-    words
-}
-
-/// The places of the bytes that are not 0, eight at a look.
-#[inline(always)]
-pub fn marked(marks: &[u8]) -> impl Iterator<Item = usize> {
-    let (chunks, rest) = marks.as_chunks::<8>();
-    let tail = chunks.len() * 8;
-    let in_chunks = chunks.iter().enumerate().flat_map(|(number, chunk)| {
-        let mut bits = u64::from_le_bytes(*chunk);
-        core::iter::from_fn(move || {
-            if bits == 0 {
-                return None;
-            }
-            let place = bits.trailing_zeros() as usize;
+    for (number, marks) in chunks.iter().chain((!rest.is_empty()).then_some(&padded)).enumerate() {
+        let mut bits = bits(marks);
+        while bits != 0 {
+            found(number * 64 + bits.trailing_zeros() as usize);
             bits &= bits - 1;
-            Some(number * 8 + place / 8)
-        })
-    });
-    in_chunks.chain(rest.iter().enumerate().filter(|(_, mark)| **mark != 0).map(move |(i, _)| tail + i))
-}
-
-/// Calls `found` with the place of every value of at most `limit`, in order.
-#[inline(always)]
-pub fn each_at_most(values: &[u8], limit: u8, found: &mut dyn FnMut(usize)) {
-    for (number, chunk) in values.chunks(64).enumerate() {
-        for (group, mut marks) in at_most(chunk, limit).into_iter().enumerate() {
-            while marks != 0 {
-                found(number * 64 + group * 8 + marks.trailing_zeros() as usize / 8);
-                marks &= marks - 1;
-            }
         }
     }
+}
+
+/// Marks the values of at most `limit`: bit `i % 64` of word `i / 64` for value `i`.
+#[inline(always)]
+pub fn marks_at_most(values: &[u8], limit: u8, marks: &mut [u64]) {
+    for (marks, values) in marks.iter_mut().zip(values.chunks(64)) {
+        *marks = at_most(values, limit);
+    }
+}
+
+/// The places of the bits that are 1.
+#[inline(always)]
+pub fn places(marks: &[u64]) -> impl Iterator<Item = usize> {
+    marks.iter().enumerate().flat_map(|(number, &marks)| {
+        let mut rest = marks;
+        core::iter::from_fn(move || {
+            let bit = (rest != 0).then(|| rest.trailing_zeros() as usize)?;
+            rest &= rest - 1;
+            Some(number * 64 + bit)
+        })
+    })
 }
 
 /// Corners of the frame that look like one stored corner, side by side.
@@ -386,6 +422,7 @@ pub const LANES: usize = 16;
 
 /// A block of corners of the frame that look like one stored corner; what fills it up has no gain.
 #[derive(Debug, Clone, Copy)]
+#[repr(align(64))]
 pub struct LookAlikes {
     /// x in the frame, px.
     pub x: [f32; LANES],
@@ -435,15 +472,27 @@ pub const NUMBER_LIMIT: i32 = (1 << NUMBER_BITS) - 1;
 #[inline(always)]
 pub fn closest(blocks: &[LookAlikes], search: Search) -> i32 {
     let mut best = [0; LANES];
+    let mut found = false;
     for block in blocks {
-        for (lane, best) in best.iter_mut().enumerate() {
+        let mut squared = [0.0; LANES];
+        let mut near = false;
+        for (lane, squared) in squared.iter_mut().enumerate() {
             let [dx, dy] = [block.x[lane] - search.at[0], block.y[lane] - search.at[1]];
+            *squared = dx * dx + dy * dy;
+            near |= *squared <= search.radius_squared;
+        }
+        // Few blocks have a corner within the radius; the division is for them.
+        if !near {
+            continue;
+        }
+        found = true;
+        for (lane, best) in best.iter_mut().enumerate() {
             let (gain, level, number) = (block.gain[lane], block.level[lane], block.number[lane]);
-            let key = search_key(search, dx * dx + dy * dy, gain, level, number);
+            let key = search_key(search, squared[lane], gain, level, number);
             *best = if key > *best { key } else { *best };
         }
     }
-    best.into_iter().fold(0, |best, key| if key > best { key } else { best })
+    if found { best.into_iter().fold(0, |best, key| if key > best { key } else { best }) } else { 0 }
 }
 
 /// Candidate correspondences as columns of equal length.

@@ -61,6 +61,7 @@
 #![forbid(unsafe_code)]
 
 pub mod math;
+mod heap;
 pub mod point;
 pub mod profile;
 pub mod feature;

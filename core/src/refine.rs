@@ -127,9 +127,13 @@ fn supporters<const PAIRS: usize>(
             continue;
         }
         let predicted = hypothesis.frame_from_view.apply(from);
-        let distance = crate::math::sqrt(squared_distance(predicted, anchor));
-        let tolerance = SLACK + SLACK_PER_PIXEL * distance;
-        let closeness = 1.0 - squared_distance(predicted, to) / (tolerance * tolerance);
+        let (distance, error) = (squared_distance(predicted, anchor), squared_distance(predicted, to));
+        // Most end here, without the root: (a + b)² <= 2 (a² + b²), and a thousandth more than covers what is rounded.
+        if error > 2.002 * (SLACK * SLACK + SLACK_PER_PIXEL * SLACK_PER_PIXEL * distance) {
+            continue;
+        }
+        let tolerance = SLACK + SLACK_PER_PIXEL * crate::math::sqrt(distance);
+        let closeness = 1.0 - error / (tolerance * tolerance);
         if closeness > 0.0 {
             // Working memory is as large as the list of candidates.
             let _ = pairs.push(WeightedPair { from, to, weight: gain as f32 / GAIN_UNIT as f32 * closeness });

@@ -9,18 +9,20 @@ use crate::kernel::Kernels;
 const TENSOR_ROWS: usize = 5;
 /// Rows of the response that the suppression of non-maxima looks at: 3 above and 3 below.
 pub(crate) const RESPONSE_ROWS: usize = 7;
-/// Columns of the pixels beyond those of the response, and of the products.
+/// Columns of the pixels beyond those of the response, and of the gradients.
 const PIXEL_HALO: usize = 2 * REACH;
-const PRODUCT_HALO: usize = 4;
+const GRADIENT_HALO: usize = 4;
 /// Pixels that a response looks at in each direction: 1 for the gradient, 2 for the smoothing.
 pub(crate) const REACH: usize = 3;
 
 /// Rolling rows of tensor and response for a strip of at most `STRIP - 6` columns.
 ///
 /// [`ResponseRows::BYTES`] of memory, whatever the height of the image.
+// Rows begin with a line of the cache: a vector that lies across two of them takes twice as long.
 #[derive(Debug, Clone)]
+#[repr(align(64))]
 pub struct ResponseRows<const STRIP: usize> {
-    products: [[i32; STRIP]; 3],
+    gradients: [[i16; STRIP]; 2],
     tensor: [[[i32; STRIP]; 3]; TENSOR_ROWS],
     response: [[f32; STRIP]; RESPONSE_ROWS],
     /// Columns of the response in the present strip.
@@ -39,7 +41,7 @@ impl<const STRIP: usize> ResponseRows<STRIP> {
     /// Rolling rows without an image yet.
     pub const fn new() -> Self {
         Self {
-            products: [[0; STRIP]; 3],
+            gradients: [[0; STRIP]; 2],
             tensor: [[[0; STRIP]; 3]; TENSOR_ROWS],
             response: [[0.0; STRIP]; RESPONSE_ROWS],
             columns: 0,
@@ -59,9 +61,10 @@ impl<const STRIP: usize> ResponseRows<STRIP> {
     pub fn push<K: Kernels>(&mut self, kernels: &K, rows: [&[u8]; 3]) -> bool {
         let n = self.columns;
         if let Some(tensor) = self.tensor.get_mut(self.pushed % TENSOR_ROWS) {
-            let products = self.products.each_mut().map(|part| part.get_mut(..n + PRODUCT_HALO).unwrap_or_default());
-            let out = tensor.each_mut().map(|part| part.get_mut(..n).unwrap_or_default());
-            kernels.structure_row(rows, products, out);
+            let gradients = self.gradients.each_mut().map(|part| part.get_mut(..n + GRADIENT_HALO).unwrap_or_default());
+            kernels.gradient_row(rows, gradients);
+            let gradients = self.gradients.each_ref().map(|part| part.get(..n + GRADIENT_HALO).unwrap_or(&[]));
+            kernels.tensor_row(gradients, tensor.each_mut().map(|part| part.get_mut(..n).unwrap_or_default()));
         }
         self.pushed += 1;
         let Some(number) = self.complete().checked_sub(1) else { return false };

@@ -4,11 +4,13 @@
 //! answers are the same.
 
 use crate::candidate::{farthest, gain};
-use crate::kernel::{Kernels, LANES, LookAlikes};
+use crate::kernel::{Kernels, LANES, LookAlikes, NUMBER_LIMIT, places};
 use crate::refine::Pairing;
 
+/// Where nothing is looked for.
+const FAR: f32 = 1e9;
 const EMPTY: LookAlikes =
-    LookAlikes { x: [0.0; LANES], y: [0.0; LANES], gain: [0; LANES], level: [0; LANES], number: [0; LANES] };
+    LookAlikes { x: [FAR; LANES], y: [0.0; LANES], gain: [0; LANES], level: [0; LANES], number: [0; LANES] };
 
 /// For each stored corner the corners of the frame with a gain, in whole blocks, one list after the other.
 #[derive(Debug, Clone)]
@@ -29,18 +31,20 @@ impl<const STORED: usize, const BLOCKS: usize> Shortlist<STORED, BLOCKS> {
     pub fn fill<K: Kernels, const QUERY: usize>(&mut self, kernels: &K, pairing: &Pairing<'_, QUERY>) {
         self.ends.clear();
         let mut end = 0;
+        let mut marks = [0; (NUMBER_LIMIT as usize + 1) / 64];
         for (stored, &commonness) in pairing.stored.commonness.iter().enumerate() {
             let row = pairing.row(stored);
+            kernels.marks_at_most(row, farthest(commonness), &mut marks);
             let (mut lane, mut fits) = (LANES, true);
-            kernels.each_at_most(row, farthest(commonness), &mut |number| {
+            for number in places(marks.get(..row.len().div_ceil(64)).unwrap_or(&[])) {
                 let (Some(&distance), Some(position), Some(&level)) =
                     (row.get(number), pairing.query.positions.get(number), pairing.query.levels.get(number))
                 else {
-                    return;
+                    continue;
                 };
                 if lane == LANES {
                     match self.blocks.get_mut(end) {
-                        Some(block) => block.gain = [0; LANES],
+                        Some(block) => (block.x, block.gain) = ([FAR; LANES], [0; LANES]),
                         None => fits = false,
                     }
                     (lane, end) = (0, end + 1);
@@ -53,7 +57,7 @@ impl<const STORED: usize, const BLOCKS: usize> Shortlist<STORED, BLOCKS> {
                     block.number[slot] = number as i32;
                 }
                 lane += 1;
-            });
+            }
             if !fits || self.ends.push(end as u16).is_err() {
                 // A list that does not fit ends them all.
                 return;

@@ -2,7 +2,7 @@
 
 use std::sync::LazyLock;
 
-use daymark::engine::Engine;
+use daymark::engine::{Engine, STRIP};
 use daymark::enroll;
 use daymark::picture::GrayImage;
 use daymark::simd::Processor;
@@ -24,7 +24,7 @@ fn main() {
 
 /// The most features that a stage is asked for.
 const MOST: FrontEnd = front_end(800);
-type WideExtractor = Extractor<256, { MOST.slots() }>;
+type WideExtractor = Extractor<STRIP, { MOST.slots() }>;
 
 const fn front_end(features: u16) -> FrontEnd {
     FrontEnd { features, cell_share_tenths: 12 }
@@ -76,7 +76,7 @@ fn pyramid(bencher: Bencher<'_, '_>, name: &str) {
 #[divan::bench(args = names())]
 fn corners_first_level(bencher: Bencher<'_, '_>, name: &str) {
     let frame = TONED.view().expect("a frame");
-    let mut detector: Box<CornerDetector<256, { MOST.slots() }>> = Box::default();
+    let mut detector: Box<CornerDetector<STRIP, { MOST.slots() }>> = Box::default();
     with_kernels!(processor(name), kernels => bencher.bench_local(|| {
         detector.detect(kernels, black_box(frame), MOST.level_count(0), MOST.cell_share(0), |corner| {
             black_box(corner);

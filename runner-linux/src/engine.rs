@@ -40,7 +40,8 @@ pub const fn selection(profile: Profile) -> Selection {
 
 /// Features of a frame, at most.
 pub const QUERY_FEATURES: usize = 1_600;
-const STRIP: usize = 256;
+/// Width of a strip of responses: a frame of 640 px takes two, and their rows stay in the first cache.
+pub const STRIP: usize = 336;
 const SLOTS: usize = selection(Profile::Board).query.slots();
 
 type HandheldRecognizer = Recognizer<100, 200, 512, 800>;

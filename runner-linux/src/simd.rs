@@ -1,9 +1,12 @@
 //! The inner loops of core, compiled again for the vector instructions that this processor turns out to have.
 //!
-//! Nothing is written twice: each function below *is* the loop of [`daymark_core::kernel`], inlined into a function
-//! with a target feature. A test compares all of them with the portable ones, bit for bit.
+//! Each function below *is* the loop of [`daymark_core::kernel`], inlined into a function with a target feature; only
+//! the two of `by_hand` are written again. A test compares all of them with the portable ones, bit for bit.
 
 #![allow(unsafe_code, reason = "calling a function with a target feature, after asking the processor for it")]
+
+#[cfg(target_arch = "x86_64")]
+mod by_hand;
 
 use daymark_core::feature::Signature;
 use daymark_core::kernel::{self, BoxSums, Kernels, LookAlikes, Nearest, Patch, Search, Seed, VoteColumns};
@@ -59,7 +62,7 @@ impl Processor {
 /// Implements [`Kernels`] for `$name` by calling core's loops in functions with `$features`.
 #[cfg(target_arch = "x86_64")]
 macro_rules! kernels {
-    ($(#[$doc:meta])* $name:ident, $features:literal, [$($feature:tt),+]; $($function:ident($($argument:ident: $kind:ty),*) $(-> $result:ty)?;)+) => {
+    ($(#[$doc:meta])* $name:ident, $features:literal, [$($feature:tt),+], $by_hand:ident; $($function:ident($($argument:ident: $kind:ty),*) $(-> $result:ty)?;)+) => {
         $(#[$doc])*
         #[derive(Debug, Clone, Copy, PartialEq, Eq)]
         pub struct $name(());
@@ -82,25 +85,34 @@ macro_rules! kernels {
                     unsafe { widened($($argument),*) }
                 }
             )+
+
+            fn tensor_row(&self, gradients: [&[i16]; 2], out: [&mut [i32]; 3]) {
+                // SAFETY: as above.
+                unsafe { by_hand::$by_hand::tensor_row(gradients, out) }
+            }
+
+            fn marks_at_most(&self, values: &[u8], limit: u8, marks: &mut [u64]) {
+                // SAFETY: as above.
+                unsafe { by_hand::$by_hand::marks_at_most(values, limit, marks) }
+            }
         }
     };
 }
 
 #[cfg(target_arch = "x86_64")]
 macro_rules! all_kernels {
-    ($(#[$doc:meta])* $name:ident, $features:literal, $list:tt) => {
+    ($(#[$doc:meta])* $name:ident, $features:literal, $list:tt, $by_hand:ident) => {
         kernels! {
-            $(#[$doc])* $name, $features, $list;
+            $(#[$doc])* $name, $features, $list, $by_hand;
             shrink_seven_to_five(rows: [&[u8]; 3], weights: [u16; 3], out: &mut [u8]);
             halve(upper: &[u8], lower: &[u8], out: &mut [u8]);
             tone_row(row: &[u8], out: &mut [u8]);
-            structure_row(rows: [&[u8]; 3], products: [&mut [i32]; 3], out: [&mut [i32]; 3]);
+            gradient_row(rows: [&[u8]; 3], out: [&mut [i16]; 2]);
             response_row(rows: [[&[i32]; 3]; 5], out: &mut [f32]);
-            peak_flags(rows: [&[f32]; 3], flags: &mut [u8]);
+            peak_flags(rows: [&[f32]; 3], least: f32, flags: &mut [u8]);
             box_sums(patch: &Patch, sums: &mut BoxSums);
             distances(signature: Signature, others: &[Signature], out: &mut [u8]);
             count_below(values: &[u8], limit: u8) -> u32;
-            each_at_most(values: &[u8], limit: u8, found: &mut dyn FnMut(usize));
             closest(blocks: &[LookAlikes], search: Search) -> i32;
             nearest_three(row: &[u8], limit: u8) -> Nearest;
             votes(seed: Seed, columns: VoteColumns<'_>, agrees: &mut [u8]) -> i32;
@@ -113,14 +125,16 @@ all_kernels!(
     /// Kernels for AVX2.
     Avx2,
     "avx2,popcnt,bmi1,bmi2,lzcnt",
-    ["avx2", "popcnt", "bmi1", "bmi2", "lzcnt"]
+    ["avx2", "popcnt", "bmi1", "bmi2", "lzcnt"],
+    avx2
 );
 #[cfg(target_arch = "x86_64")]
 all_kernels!(
     /// Kernels for AVX-512 with a vector population count.
     Avx512,
     "avx2,popcnt,bmi1,bmi2,lzcnt,avx512f,avx512bw,avx512dq,avx512vl,avx512vpopcntdq",
-    ["avx2", "popcnt", "bmi1", "bmi2", "lzcnt", "avx512f", "avx512bw", "avx512dq", "avx512vl", "avx512vpopcntdq"]
+    ["avx2", "popcnt", "bmi1", "bmi2", "lzcnt", "avx512f", "avx512bw", "avx512dq", "avx512vl", "avx512vpopcntdq"],
+    avx512
 );
 
 /// Calls the expression with the kernels of this processor, each as its own type, so that the caller's loops are

@@ -17,7 +17,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::{CommandError, Outcome};
-use crate::engine::{Engine, FRAME_SIDE};
+use crate::engine::{Engine, FRAME_SIDE, STRIP};
 use crate::enroll;
 use crate::picture::{GrayImage, read_gray};
 use crate::simd::Processor;
@@ -227,8 +227,8 @@ fn measure(args: &Args, image: &GrayImage, mut table: LandmarkTable<'_>) -> Resu
 
 /// Memory of the front end, allocated once.
 struct Stages {
-    first_level: Box<CornerDetector<256, SLOTS>>,
-    extractor: Box<Extractor<256, SLOTS>>,
+    first_level: Box<CornerDetector<STRIP, SLOTS>>,
+    extractor: Box<Extractor<STRIP, SLOTS>>,
     features: Box<FeatureSet<CORNERS>>,
     levels: Vec<u8>,
     toned: Vec<u8>,
