@@ -51,7 +51,9 @@ fn every_line_of_json_is_as_the_schema_says() {
     let expected = ["answer", "camera", "counters", "end", "frame", "start", "withdrawn"];
     assert!(kinds.iter().map(String::as_str).eq(expected), "{kinds:?}");
     // The schema is not one that takes anything.
-    for wrong in [r#"{"schema_version":2,"type":"end","reason":"stopped","error":null}"#, r#"{"schema_version":1,"type":"end"}"#] {
+    for wrong in
+        [r#"{"schema_version":2,"type":"end","reason":"stopped","error":null}"#, r#"{"schema_version":1,"type":"end"}"#]
+    {
         assert!(!validator.is_valid(&serde_json::from_str(wrong).expect("JSON")), "{wrong}");
     }
 }
@@ -105,7 +107,8 @@ fn nmea_goes_out_by_udp_a_sentence_a_datagram_with_the_time_of_day() {
 #[test]
 fn geojson_and_text_go_to_files_at_once() {
     let town = town();
-    watch(&town, &["--output", "geojson:map.geojsonl", "--output", "text:told.txt", "--output", "jsonl:all.jsonl"]).succeeded();
+    watch(&town, &["--output", "geojson:map.geojsonl", "--output", "text:told.txt", "--output", "jsonl:all.jsonl"])
+        .succeeded();
     let map = String::from_utf8(town.read("map.geojsonl")).expect("text");
     let features: Vec<Value> = map.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect();
     assert_eq!(features.len(), 2);
@@ -127,11 +130,17 @@ fn pictures_that_are_good_for_nothing_are_named() {
     town.draw("frames/032.pgm", 320, 240, |x, _| 128 + (x % 2) as u8);
     town.draw("frames/033.pgm", 320, 240, blurred);
     let ran = watch(&town, &["--output", "text:-"]).succeeded();
-    for said in ["the picture is too dark", "blown out: a shorter exposure", "the picture is empty: see", "blurred: clean and focus"] {
+    for said in [
+        "the picture is too dark",
+        "blown out: a shorter exposure",
+        "the picture is empty: see",
+        "blurred: clean and focus",
+    ] {
         assert!(ran.stdout.contains(said), "{said}: {}", ran.stdout);
     }
     let ran = watch(&town, &["--json"]).succeeded();
-    let qualities: Vec<Value> = ran.stdout.lines().map(|line| serde_json::from_str::<Value>(line).expect("JSON")["quality"].clone()).collect();
+    let qualities: Vec<Value> =
+        ran.stdout.lines().map(|line| serde_json::from_str::<Value>(line).expect("JSON")["quality"].clone()).collect();
     let named: Vec<&str> = qualities.iter().filter_map(Value::as_str).collect();
     assert!(named[..30].iter().all(|quality| *quality == "good"), "{named:?}");
     assert_eq!(named[30..], ["dark", "blown_out", "empty", "blurred"]);
@@ -154,7 +163,10 @@ fn the_same_frames_give_the_same_answers_from_every_kind_of_input() {
     town.write("y8.raw", rows(320, 0));
     town.write("padded.raw", rows(384, 384 * 120));
     let y4m = |picture: &Vec<u8>| [b"FRAME\n".as_slice(), picture, &[128; 320 * 120]].concat();
-    town.write("video.y4m", [b"YUV4MPEG2 W320 H240 F10:1 C420jpeg\n".to_vec(), pictures.iter().flat_map(y4m).collect()].concat());
+    town.write(
+        "video.y4m",
+        [b"YUV4MPEG2 W320 H240 F10:1 C420jpeg\n".to_vec(), pictures.iter().flat_map(y4m).collect()].concat(),
+    );
     let answers = |arguments: &[&str]| -> Vec<Value> {
         let ran = town.run(&[&["watch", "--table", "town.daymark", "--json"], arguments].concat()).succeeded();
         let lines = ran.stdout.lines().map(|line| serde_json::from_str::<Value>(line).expect("JSON"));
@@ -164,13 +176,17 @@ fn the_same_frames_give_the_same_answers_from_every_kind_of_input() {
     let expected = answers(&["--frames", "frames"]);
     assert_eq!(expected.len(), 3);
     assert_eq!(answers(&[&["--input", "y8.raw", "--format", "y8"], &size[..]].concat()), expected);
-    assert_eq!(answers(&[&["--input", "padded.raw", "--format", "yu12", "--stride", "384"], &size[..]].concat()), expected);
+    assert_eq!(
+        answers(&[&["--input", "padded.raw", "--format", "yu12", "--stride", "384"], &size[..]].concat()),
+        expected
+    );
     assert_eq!(answers(&["--input", "video.y4m", "--format", "y4m"]), expected);
 
     // A stream that ends within a frame.
     let whole = town.read("y8.raw");
     town.write("cut.raw", &whole[..whole.len() - 1_000]);
-    let ran = town.run(&[&["watch", "--table", "town.daymark", "--input", "cut.raw", "--format", "y8"], &size[..]].concat());
+    let ran =
+        town.run(&[&["watch", "--table", "town.daymark", "--input", "cut.raw", "--format", "y8"], &size[..]].concat());
     assert!(ran.succeeded().stderr.contains("a frame of 75800 bytes instead of 76800"));
 }
 
