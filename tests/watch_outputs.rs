@@ -80,7 +80,7 @@ fn nmea_is_read_back_as_an_estimate_and_never_as_a_satellite_fix() {
     assert!(sentences[1].contains(",A,") && sentences[1].contains(",E*"), "{}", sentences[1]);
     let ParseResult::GST(gst) = parse_str(sentences[2]).expect("GST") else { panic!("{}", sentences[2]) };
     // (20 m of the building's place + 180 m of reach) / 2, along each axis.
-    assert_eq!((gst.std_dev_latitude, gst.std_dev_longitude), (Some(100.0), Some(100.0)), "{gst:?}");
+    assert_eq!((gst.lat_sd, gst.long_sd), (Some(100.0), Some(100.0)), "{gst:?}");
     assert!(sentences[3].starts_with("$INTLL,00,5230.000000,N,01315.000000,W,Gate  old ,,T,*"), "{}", sentences[3]);
     let ParseResult::GGA(gone) = parse_str(sentences[8]).expect("GGA") else { panic!("{}", sentences[8]) };
     assert_eq!((gone.fix_type, gone.latitude), (Some(nmea::sentences::FixType::Invalid), None));
