@@ -16,7 +16,7 @@ use tracing::{Event, Level, Metadata, Subscriber};
 use crate::calendar::{civil, clock};
 
 /// Sends events from INFO on to standard error. Called again, it changes nothing.
-pub fn to_stderr() {
+pub(crate) fn to_stderr() {
     let journal = std::env::var_os("JOURNAL_STREAM").is_some();
     // Another log is there already, as in tests.
     let _ = tracing::subscriber::set_global_default(Log { journal });
