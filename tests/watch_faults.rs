@@ -194,5 +194,7 @@ fn a_camera_that_is_not_there_is_waited_for_until_it_is_asked_to_stop() {
 fn what_is_no_camera_is_refused_at_once() {
     let town = town();
     let arguments = ["watch", "--table", "town.daymark", "--camera", "/dev/null", "--output", "text:told"];
-    town.run(&arguments).refused(&["/dev/null is not a camera", "--list"]);
+    let ran = town.run(&arguments);
+    assert_eq!((ran.code, ran.stdout.as_str()), (Some(2), ""), "{ran:?}");
+    assert!(ran.stderr.contains("error: /dev/null is not a camera; daymark watch --list shows"), "{ran:?}");
 }
