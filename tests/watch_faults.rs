@@ -163,6 +163,16 @@ fn a_picture_that_cannot_be_read_is_left_out() {
 }
 
 #[test]
+fn many_pictures_that_cannot_be_read_do_not_take_the_others_with_them() {
+    let town = town();
+    (3..15).for_each(|number| town.write(&format!("frames/{number:03}.pgm"), b"not a picture"));
+    let (ran, lines) = watch(&town, &["--frames", "frames"]);
+    ran.succeeded();
+    assert_eq!(lines.iter().filter(|line| line["type"] == "frame").count(), FRAMES - 12);
+    assert!(story(&lines).contains(&"lost corrupt_frame 1".to_owned()), "{:?}", story(&lines));
+}
+
+#[test]
 fn a_camera_that_is_not_there_is_waited_for_until_it_is_asked_to_stop() {
     let town = town();
     let mut command = town.command();
@@ -184,5 +194,7 @@ fn a_camera_that_is_not_there_is_waited_for_until_it_is_asked_to_stop() {
 fn what_is_no_camera_is_refused_at_once() {
     let town = town();
     let arguments = ["watch", "--table", "town.daymark", "--camera", "/dev/null", "--output", "text:told"];
-    town.run(&arguments).refused(&["/dev/null is not a camera", "--list"]);
+    let ran = town.run(&arguments);
+    assert_eq!((ran.code, ran.stdout.as_str()), (Some(2), ""), "{ran:?}");
+    assert!(ran.stderr.contains("error: /dev/null is not a camera; daymark watch --list shows"), "{ran:?}");
 }

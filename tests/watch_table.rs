@@ -10,7 +10,7 @@ use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;
 use support::{Town, fixture};
 
-/// A run over 600 frames of tower 1, ten a second in real time, and its lines.
+/// A run over 3,000 frames of tower 1, and its lines. It waits for whoever reads them.
 struct Running {
     child: Child,
     lines: std::io::Lines<BufReader<ChildStdout>>,
@@ -18,8 +18,7 @@ struct Running {
 
 impl Running {
     fn start(town: &Town) -> Self {
-        let arguments =
-            ["watch", "--table", "town.daymark", "--frames", "frames", "--real-time", "--rate", "10", "--json"];
+        let arguments = ["watch", "--table", "town.daymark", "--frames", "frames", "--json"];
         let mut command = town.command();
         command.args(arguments).stdout(Stdio::piped()).stderr(Stdio::null());
         let mut child = command.spawn().expect("the binary runs");
@@ -55,8 +54,8 @@ impl Running {
 fn town() -> Town {
     let town = Town::with_table();
     std::fs::create_dir(town.path("frames")).expect("a folder");
-    for number in 0..600 {
-        std::os::unix::fs::symlink(fixture("tower-1-left.pgm"), town.path(&format!("frames/{number:03}.pgm")))
+    for number in 0..3_000 {
+        std::os::unix::fs::symlink(fixture("tower-1-left.pgm"), town.path(&format!("frames/{number:04}.pgm")))
             .expect("a frame");
     }
     town

@@ -33,7 +33,7 @@ fn known_buildings_are_named_while_they_are_seen_and_unknown_ones_never() {
         building["pixel_share"].as_f64().expect("a share")
     };
     let said = lines(&first.stdout);
-    let of_type = |kind: &str| said.iter().filter(move |line| line["type"] == kind);
+    let of_type = |kind: &'static str| said.iter().filter(move |line| line["type"] == kind);
     assert_eq!(of_type("frame").count(), frames, "every frame was looked at");
     let at = |line: &Value| line["frame"].as_u64().expect("a number") as usize;
     let answers = || of_type("answer").filter(|line| line["repeated"] == false);

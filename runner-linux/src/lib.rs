@@ -16,6 +16,8 @@ pub mod engine;
 pub mod enroll;
 pub mod table_file;
 pub mod dataset;
+mod calendar;
+mod log;
 pub mod frame;
 pub mod report;
 pub mod output;

@@ -1,6 +1,6 @@
 //! `daymark watch`: a camera, a pipe or a folder becomes answers that stand until they are withdrawn.
 
-use std::io::{self, IsTerminal, Write};
+use std::io::{self, Write};
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -8,13 +8,14 @@ use daymark_core::verdict::FalseAnswer;
 
 use super::recognize::probability;
 use super::{CommandError, Outcome};
-use crate::frame::Opener;
 use crate::frame::capture::{Capture, Patience};
 use crate::frame::convert::{Layout, PixelFormat};
 use crate::frame::folder::Folder;
 use crate::frame::mock::{Mock, Planned};
 use crate::frame::pipe::{Content, Pipe};
 use crate::frame::v4l2::{Camera, Controls, list};
+use crate::frame::{Delivery, Opener};
+use crate::log;
 use crate::output::target::{Sink, Target};
 use crate::output::{FormName, Wanted};
 use crate::watch::look::Recognizing;
@@ -158,7 +159,7 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     }
     let path = args.table.as_ref().ok_or("give the table to recognize buildings of: --table TABLE")?;
     let signals = Signals::listen()?;
-    log_to_stderr();
+    log::to_stderr();
     let table = LiveTable::load(path)?;
     let reloader = Reloader::new(path);
     if table.table().view_count() == 0 {
@@ -167,7 +168,7 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     let (opener, patience) = source(args)?;
     let name = opener.name();
     let delivery = opener.delivery();
-    let outputs = outputs(args, delivery == crate::frame::Delivery::Every)?;
+    let outputs = outputs(args, delivery == Delivery::Every)?;
     let look = Recognizing::new(table, FalseAnswer::at_most(args.max_false_answer));
     let run = Run {
         capture: Capture::start(opener, patience)?,
@@ -231,16 +232,4 @@ fn outputs(args: &Args, patient: bool) -> Result<Vec<Output>, CommandError> {
         Ok(Output { form: form.make(), sink: Sink::start(target, patient)? })
     };
     wanted.into_iter().map(output).collect()
-}
-
-/// The log goes to standard error: a line an event, with names for its values. The journal has its own clock.
-fn log_to_stderr() {
-    let journal = std::env::var_os("JOURNAL_STREAM").is_some();
-    let log = tracing_subscriber::fmt()
-        .with_writer(io::stderr)
-        .with_ansi(io::stderr().is_terminal())
-        .with_target(false)
-        .with_max_level(tracing::Level::INFO);
-    // A second call, as in tests, changes nothing.
-    let _ = if journal { log.without_time().try_init() } else { log.try_init() };
 }

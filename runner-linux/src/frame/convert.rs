@@ -155,7 +155,8 @@ impl Layout {
         }
         let options = DecoderOptions::default()
             .jpeg_set_out_colorspace(ColorSpace::Luma)
-            .set_strict_mode(true)
+            // Cameras leave out tables and pad segments; strictness would refuse all that such a one gives.
+            .set_strict_mode(false)
             .set_max_width(16_384)
             .set_max_height(16_384);
         let mut decoder = JpegDecoder::new_with_options(ZCursor::new(bytes), options);

@@ -3,6 +3,7 @@
 use std::collections::VecDeque;
 use std::io;
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant, SystemTime};
 
 use super::{Delivery, Fault, Frame, FrameSource, Opener};
@@ -38,9 +39,15 @@ pub fn pictures(path: &Path) -> Result<Vec<PathBuf>, String> {
 #[derive(Debug, Clone)]
 pub struct Folder {
     name: String,
-    files: VecDeque<PathBuf>,
     rate_hz: f64,
     real_time: bool,
+    /// What is left outlives a source that is closed and opened again.
+    left: Arc<Mutex<Left>>,
+}
+
+#[derive(Debug)]
+struct Left {
+    files: VecDeque<PathBuf>,
     number: u64,
 }
 
@@ -51,8 +58,12 @@ impl Folder {
     /// # Errors
     /// What is wrong with the path.
     pub fn new(path: &Path, rate_hz: f64, real_time: bool) -> Result<Self, String> {
-        let files = pictures(path)?.into();
-        Ok(Self { name: path.display().to_string(), files, rate_hz, real_time, number: 0 })
+        let left = Left { files: pictures(path)?.into(), number: 0 };
+        Ok(Self { name: path.display().to_string(), rate_hz, real_time, left: Arc::new(Mutex::new(left)) })
+    }
+
+    fn left(&self) -> MutexGuard<'_, Left> {
+        self.left.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -62,8 +73,9 @@ impl Opener for Folder {
     }
 
     fn open(&mut self) -> Result<Box<dyn FrameSource>, Fault> {
-        let folder = std::mem::replace(self, Self { files: VecDeque::new(), name: self.name.clone(), ..*self });
-        Ok(Box::new(OpenFolder { folder, begin: Instant::now() }))
+        let passed = Duration::from_secs_f64(self.left().number as f64 / self.rate_hz);
+        let now = Instant::now();
+        Ok(Box::new(OpenFolder { folder: self.clone(), begin: now.checked_sub(passed).unwrap_or(now) }))
     }
 
     fn delivery(&self) -> Delivery {
@@ -82,16 +94,17 @@ struct OpenFolder {
 
 impl FrameSource for OpenFolder {
     fn describe(&self) -> String {
-        let Folder { name, files, rate_hz, real_time, .. } = &self.folder;
+        let Folder { name, rate_hz, real_time, .. } = &self.folder;
         let pace = if *real_time { ", in real time" } else { "" };
-        format!("{name}: {} pictures, {rate_hz} a second{pace}", files.len())
+        format!("{name}: {} pictures, {rate_hz} a second{pace}", self.folder.left().files.len())
     }
 
     fn next(&mut self, frame: &mut Frame, patience: Duration) -> Result<(), Fault> {
-        let folder = &mut self.folder;
-        let Some(file) = folder.files.front() else { return Err(Fault::End) };
-        let due = Duration::from_secs_f64(folder.number as f64 / folder.rate_hz);
-        if folder.real_time {
+        let Folder { rate_hz, real_time, .. } = self.folder;
+        let mut left = self.folder.left();
+        let Some(file) = left.files.front() else { return Err(Fault::End) };
+        let due = Duration::from_secs_f64(left.number as f64 / rate_hz);
+        if real_time {
             let early = (self.begin + due).saturating_duration_since(Instant::now());
             if early > patience {
                 std::thread::sleep(patience);
@@ -102,11 +115,11 @@ impl FrameSource for OpenFolder {
         let begin = Instant::now();
         let read = read_gray(file).map_err(|error| Fault::Corrupt(error.to_string()));
         frame.file = file.file_name().map(|name| name.to_string_lossy().into_owned());
-        folder.files.pop_front();
-        frame.number = folder.number;
-        folder.number += 1;
+        left.files.pop_front();
+        frame.number = left.number;
+        left.number += 1;
         frame.time = due;
-        frame.utc = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).ok().filter(|_| folder.real_time);
+        frame.utc = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).ok().filter(|_| real_time);
         frame.gray = read?;
         frame.decode = begin.elapsed();
         Ok(())

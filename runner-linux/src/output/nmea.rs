@@ -9,6 +9,7 @@ use std::fmt::Write as _;
 use super::Form;
 use super::fix::Fix;
 use super::record::{Answer, Record, Withdrawn};
+use crate::calendar::{civil, clock};
 use crate::report::finding::Position;
 
 /// TLL has two digits for a target.
@@ -83,25 +84,13 @@ impl Time {
         let Some(utc_s) = utc_s else { return Self { hhmmss: String::new(), ddmmyy: String::new() } };
         let hundredths = (utc_s * 100.0) as u64;
         let (seconds, rest) = (hundredths / 100, hundredths % 100);
-        let day = seconds % 86_400;
+        let (hour, minute, second) = clock(seconds);
         let (year, month, date) = civil(seconds / 86_400);
         Self {
-            hhmmss: format!("{:02}{:02}{:02}.{rest:02}", day / 3_600, day / 60 % 60, day % 60),
+            hhmmss: format!("{hour:02}{minute:02}{second:02}.{rest:02}"),
             ddmmyy: format!("{date:02}{month:02}{:02}", year % 100),
         }
     }
-}
-
-/// Year, month and day of a number of days since 1970 (H. Hinnant, "chrono-compatible low-level date algorithms").
-const fn civil(days: u64) -> (u64, u64, u64) {
-    let shifted = days + 719_468;
-    let (era, day_of_era) = (shifted / 146_097, shifted % 146_097);
-    let year_of_era = (day_of_era - day_of_era / 1_460 + day_of_era / 36_524 - day_of_era / 146_096) / 365;
-    let day_of_year = day_of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
-    let shifted_month = (5 * day_of_year + 2) / 153;
-    let day = day_of_year - (153 * shifted_month + 2) / 5 + 1;
-    let month = if shifted_month < 10 { shifted_month + 3 } else { shifted_month - 9 };
-    (year_of_era + era * 400 + (month <= 2) as u64, month, day)
 }
 
 /// `ddmm.mmmmmm,N`; exact, because 1e-7 degrees are six millionths of a minute.
@@ -170,10 +159,7 @@ mod tests {
     }
 
     #[test]
-    fn dates_are_those_of_the_calendar() {
-        assert_eq!(civil(0), (1970, 1, 1));
-        assert_eq!(civil(19_782), (2024, 2, 29));
-        assert_eq!(civil(20_819), (2027, 1, 1));
+    fn time_is_cut_to_hundredths_and_years_to_two_digits() {
         let time = Time::of(Some(1_709_251_199.999));
         assert_eq!((time.hhmmss.as_str(), time.ddmmyy.as_str()), ("235959.99", "290224"));
     }

@@ -83,12 +83,12 @@ fn write_counters(line: &mut String, counters: &Counters) -> std::fmt::Result {
     let Counters { frames, looked_at, stale, missing, opened, .. } = counters;
     writeln!(
         line,
-        "{} frames came, {} looked at, {} dropped for a newer one, {} lost before; source opened {} times",
+        "{} frames came, {} looked at, {} dropped for a newer one, {} lost before; source opened {}",
         grouped(*frames),
         grouped(*looked_at),
         grouped(*stale),
         grouped(*missing),
-        grouped(*opened)
+        count(*opened as usize, "time")
     )?;
     let list = |names: &std::collections::BTreeMap<&'static str, u64>| {
         names.iter().map(|(name, count)| format!("{name} {}", grouped(*count))).collect::<Vec<_>>().join(", ")

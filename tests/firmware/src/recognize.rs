@@ -3,6 +3,7 @@
 use daymark_core::capacity::HandheldRecognizer;
 use daymark_core::extract::Features;
 use daymark_core::kernel::Portable;
+use daymark_core::over_frames::{EvidenceOverFrames, Withdrawal};
 use daymark_core::table::{HEADER_BYTES, Header, LandmarkTable, TableStream, ViewSource};
 use daymark_core::verdict::{FalseAnswer, Recognition, Verdict};
 
@@ -21,7 +22,22 @@ pub fn recognize(features: Features<'_>, device: &mut Device) -> Result<Outcome,
     let name_bytes = from_stream(features, flash, length, device.answer(1))?;
     let known = device.answer(0).is_some_and(|answer| matches!(answer.verdict, Verdict::Known(_)));
     let same = device.answers_agree();
+    let known = known && device.answer(0).is_some_and(|answer| stands(&answer));
     Ok(Outcome { known, same, corners: features.len(), explained, name_bytes })
+}
+
+/// Whether the answer stands when a camera shows the frame twice, another scene, and nothing usable in between.
+#[inline(never)]
+fn stands(recognition: &Recognition) -> bool {
+    let mut evidence = const { EvidenceOverFrames::<4>::new(FalseAnswer::ONE_PERCENT) };
+    let given = evidence.frame(recognition).given;
+    evidence.unusable();
+    evidence.new_scene();
+    evidence.frame(recognition);
+    evidence.renumber(|number| number.checked_add(1));
+    let moved = evidence.standing();
+    evidence.end(Withdrawal::Ended);
+    given.is_some_and(|belief| belief.landmark.checked_add(1) == moved) && evidence.best().is_none()
 }
 
 /// The distances and the recognizer live during this call only.

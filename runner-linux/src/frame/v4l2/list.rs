@@ -4,10 +4,10 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use v4l::Device;
 use v4l::capability::Flags;
 use v4l::framesize::FrameSizeEnum;
 use v4l::video::Capture;
+use v4l::{Device, FourCC};
 
 use super::{RAW_DRIVERS, capabilities};
 use crate::frame::convert::PixelFormat;
@@ -66,20 +66,30 @@ fn describe(text: &mut String, path: &Path) -> std::fmt::Result {
     if !has.capabilities.contains(Flags::VIDEO_CAPTURE) {
         return writeln!(text, "  gives no frames (metadata, output, or several planes)");
     }
-    for format in device.enum_formats().unwrap_or_default() {
-        let name = String::from_utf8_lossy(&format.fourcc.repr).into_owned();
-        let usable = if PixelFormat::from_fourcc(format.fourcc.repr).is_some() { "" } else { " (not read by daymark)" };
-        let sizes = device.enum_framesizes(format.fourcc).unwrap_or_default();
-        let sizes: Vec<String> = sizes
-            .iter()
-            .map(|size| match &size.size {
-                FrameSizeEnum::Discrete(size) => format!("{}x{}", size.width, size.height),
-                FrameSizeEnum::Stepwise(size) => {
-                    format!("{}x{} to {}x{}", size.min_width, size.min_height, size.max_width, size.max_height)
-                }
-            })
-            .collect();
-        writeln!(text, "  {name}{usable}: {}", sizes.join(", "))?;
+    let (read, other): (Vec<_>, Vec<_>) = device
+        .enum_formats()
+        .unwrap_or_default()
+        .into_iter()
+        .map(|format| format.fourcc)
+        .partition(|fourcc| PixelFormat::from_fourcc(fourcc.repr).is_some());
+    // The highest bit of the last letter means big-endian.
+    let name = |fourcc: &FourCC| String::from_utf8_lossy(&fourcc.repr.map(|letter| letter & 0x7F)).trim().to_owned();
+    for fourcc in &read {
+        let sizes = device.enum_framesizes(*fourcc).unwrap_or_default();
+        let sizes: Vec<String> = sizes.iter().map(|size| size_text(&size.size)).collect();
+        writeln!(text, "  {}: {}", name(fourcc), sizes.join(", "))?;
+    }
+    if !other.is_empty() {
+        writeln!(text, "  not read by daymark: {}", other.iter().map(name).collect::<Vec<_>>().join(", "))?;
     }
     Ok(())
+}
+
+fn size_text(size: &FrameSizeEnum) -> String {
+    match size {
+        FrameSizeEnum::Discrete(size) => format!("{}x{}", size.width, size.height),
+        FrameSizeEnum::Stepwise(size) => {
+            format!("{}x{} to {}x{}", size.min_width, size.min_height, size.max_width, size.max_height)
+        }
+    }
 }
