@@ -81,7 +81,7 @@ fn correspond_by(
     };
     let (mut scratch, mut quads) = (
         vec![Arrangement::default(); scratch_length(second.len())],
-        vec![LayerQuad::default(); quads_of(second.len())],
+        vec![LayerQuad::default(); quads_of(first.len() + second.len())],
     );
     let answer = workspace.correspond(first, second, settings, &mut scratch, &mut quads).unwrap();
     (answer, workspace.found().iter().map(|found| found.pair).collect())
@@ -147,7 +147,7 @@ proptest! {
         };
         prop_assert_eq!(plain(&layer), plain(&turned));
         let tolerant = |layer: &[u16]| {
-            let mut quads = vec![LayerQuad::default(); quads_of(6)];
+            let mut quads = vec![LayerQuad::default(); quads_of(12)];
             let mut found = BTreeSet::new();
             let terms = Terms { sigma: 0.5, area: 640.0 * 480.0, invariance: Invariance::Affine };
             propose((&first, layer, 0), (&second, &[0, 1, 2, 3, 4, 5], 0), terms, &mut quads, |proposal| {

@@ -7,6 +7,7 @@
 
 use heapless::Vec;
 
+use super::heap_sort::sort_by;
 use super::proposal::{Invariance, Pairing, Proposal, Terms};
 use crate::math::{log2, sqrt};
 use crate::point::ImagePoint;
@@ -130,12 +131,19 @@ pub enum NoAgreement {
 /// The corner that a first one is paired with, and the squared residual; [`NONE`] and 0 without.
 type Match = (u16, f32);
 
+/// A corner's place, px, and its number.
+type Numbered = ([f32; 2], u16);
+
 /// The workspace of a verification of at most `POINTS` corners a picture.
 #[derive(Debug, Clone)]
 pub struct Agreement<const POINTS: usize> {
     first: Vec<[f32; 2], POINTS>,
     second: Vec<[f32; 2], POINTS>,
+    /// The second corners from left to right.
+    rightwards: Vec<Numbered, POINTS>,
     matched: Vec<Match, POINTS>,
+    /// The second corners of `matched` that the last fit was made of.
+    fitted: Vec<u16, POINTS>,
     /// Of each second corner the first one that is nearest.
     taken: Vec<Match, POINTS>,
     pairs: Vec<WeightedPair, POINTS>,
@@ -149,6 +157,8 @@ impl<const POINTS: usize> Agreement<POINTS> {
         Self {
             first: Vec::new(),
             second: Vec::new(),
+            rightwards: Vec::new(),
+            fitted: Vec::new(),
             matched: Vec::new(),
             taken: Vec::new(),
             pairs: Vec::new(),
@@ -223,6 +233,11 @@ impl<const POINTS: usize> Agreement<POINTS> {
             }
         }
         self.area = bounding_area(&self.second);
+        self.rightwards.clear();
+        for (number, &place) in (0_u16..).zip(&self.second) {
+            let _ = self.rightwards.push((place, number));
+        }
+        sort_by(&mut self.rightwards, |a, b| a.0[0].total_cmp(&b.0[0]).then(a.1.cmp(&b.1)).is_lt());
         self.best.clear();
     }
 
@@ -261,12 +276,17 @@ impl<const POINTS: usize> Agreement<POINTS> {
         let mut best = start;
         let [.., [g, h, _]] = start.map.0;
         let affine = g == 0.0 && h == 0.0;
-        for _ in 0..if affine { ROUNDS } else { 0 } {
-            self.assign(&best, terms.sigma);
+        let mut found = self.assign(&best, terms.sigma);
+        for round in 0..if affine { ROUNDS } else { 0 } {
+            // The same pairs give the same fit, from now on.
+            if round > 0 && self.is_settled() {
+                break;
+            }
             let Some(fit) = self.refit() else { break };
             (best.fit, best.map) = (fit, fit.map.into());
+            found = self.assign(&best, terms.sigma);
         }
-        best.bits = self.assign(&best, terms.sigma);
+        best.bits = self.bits(found);
         if terms.invariance == Invariance::Affine {
             return best;
         }
@@ -283,10 +303,12 @@ impl<const POINTS: usize> Agreement<POINTS> {
             // corners, and narrow ones judge them.
             (tilted.fit, tilted.map) = (fit, map);
             let wide = if round + 2 < ROUNDS_OF_PERSPECTIVE { GROWING } else { 1.0 };
-            tilted.bits = self.assign(&tilted, wide * terms.sigma) - free;
+            let found = self.assign(&tilted, wide * terms.sigma);
+            tilted.bits = self.bits(found) - free;
         }
         if tilted.bits <= best.bits {
-            best.bits = self.assign(&best, terms.sigma);
+            let found = self.assign(&best, terms.sigma);
+            best.bits = self.bits(found);
             return best;
         }
         tilted
@@ -294,7 +316,9 @@ impl<const POINTS: usize> Agreement<POINTS> {
 
     fn refit(&mut self) -> Option<Fit> {
         self.pairs.clear();
+        self.fitted.clear();
         for (&from, &(second, _)) in self.first.iter().zip(&self.matched) {
+            let _ = self.fitted.push(second);
             if let Some(&to) = self.second.get(usize::from(second)) {
                 let _ = self.pairs.push(WeightedPair { from, to, weight: 1.0 });
             }
@@ -302,9 +326,14 @@ impl<const POINTS: usize> Agreement<POINTS> {
         if self.pairs.len() < 4 { None } else { Fit::of(&self.pairs) }
     }
 
-    /// Pairs every first corner with the nearest second one within the gate, one to one; gives the bits. A corner with two
-    /// about equally near ones is left out: they decide nothing.
-    fn assign(&mut self, candidate: &Candidate, sigma: f32) -> f32 {
+    /// Whether the matches are those that the last fit was made of.
+    fn is_settled(&self) -> bool {
+        self.matched.iter().map(|m| m.0).eq(self.fitted.iter().copied())
+    }
+
+    /// Pairs every first corner with the nearest second one within the gate, one to one. A corner with two about equally
+    /// near ones is left out: they decide nothing.
+    fn assign(&mut self, candidate: &Candidate, sigma: f32) -> Assigned {
         self.matched.clear();
         self.taken.clear();
         for _ in &self.second {
@@ -315,7 +344,7 @@ impl<const POINTS: usize> Agreement<POINTS> {
             let gate = GATE * sigma * sigma * candidate.fit.variance(point);
             let gate = if gate < WIDEST_GATE { gate } else { WIDEST_GATE };
             gates += gate;
-            let (nearest, second) = nearest_two(&self.second, candidate.map.apply(point));
+            let (nearest, second) = nearest_two(&self.rightwards, candidate.map.apply(point), gate);
             let clear = nearest.1 <= gate && (second > gate || second > 4.0 * nearest.1);
             let _ = self.matched.push(if clear { nearest } else { (NONE, 0.0) });
             if clear
@@ -332,17 +361,37 @@ impl<const POINTS: usize> Agreement<POINTS> {
             }
             count += u32::from(matched.0 != NONE);
         }
+        Assigned { count, gates }
+    }
+
+    fn bits(&self, Assigned { count, gates }: Assigned) -> f32 {
         let trials = self.first.len().max(1) as u32;
         let chance = core::f32::consts::PI * gates / trials as f32 * self.second.len() as f32 / self.area;
         tail(count, trials, chance)
     }
 }
 
-/// The nearest place and its squared distance, and the squared distance of the second nearest.
-fn nearest_two(places: &[[f32; 2]], [x, y]: [f32; 2]) -> (Match, f32) {
+/// How many corners were matched, and the sum of the gates, px².
+#[derive(Clone, Copy)]
+struct Assigned {
+    count: u32,
+    gates: f32,
+}
+
+/// The nearest place and its squared distance, and the squared distance of the second nearest, of those whose distance along
+/// x alone is within the gate: the places are in the order of x. What is beyond is as good as nothing; of equally near ones
+/// any is the nearest, since neither is clear.
+fn nearest_two(places: &[Numbered], [x, y]: [f32; 2], gate: f32) -> (Match, f32) {
     let (mut nearest, mut second) = ((NONE, f32::MAX), f32::MAX);
-    for (number, place) in (0_u16..).zip(places) {
+    let from = places.partition_point(|(place, _)| {
+        let dx = place[0] - x;
+        dx < 0.0 && dx * dx > gate
+    });
+    for &(place, number) in places.iter().skip(from) {
         let (dx, dy) = (place[0] - x, place[1] - y);
+        if dx > 0.0 && dx * dx > gate {
+            break;
+        }
         let distance = dx * dx + dy * dy;
         if distance < nearest.1 {
             second = nearest.1;

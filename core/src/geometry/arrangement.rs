@@ -10,7 +10,7 @@ use heapless::Vec;
 
 use super::cross_ratio::FivePoints;
 use super::proposal::{Invariance, Origin, Pairing, Proposal, Terms};
-use super::quad::Quad;
+use super::quad::{Expected, Quad};
 use crate::math::log2;
 use crate::point::ImagePoint;
 
@@ -198,10 +198,11 @@ fn compare(p: [ImagePoint; 5], q: [ImagePoint; 5], terms: Terms) -> Option<i32> 
     let ([p0, p1, p2, p3, p4], [q0, q1, q2, q3, q4]) = (p, q);
     let bits = match terms.invariance {
         Invariance::Affine => {
-            let one = terms.affine_bits(Quad::new([p0, p1, p2, p3]), Quad::new([q0, q1, q2, q3]))?;
-            one + terms.affine_bits(Quad::new([p0, p2, p3, p4]), Quad::new([q0, q2, q3, q4]))?
+            let expected = |points| Expected::new(&Quad::new(points), terms.sigma);
+            let one = terms.affine_bits(&expected([p0, p1, p2, p3]), [q0, q1, q2, q3])?;
+            one + terms.affine_bits(&expected([p0, p2, p3, p4]), [q0, q2, q3, q4])?
         }
-        Invariance::Perspective => terms.perspective_bits(p, q)?,
+        Invariance::Perspective => terms.perspective_bits(&FivePoints::new(p)?, q)?,
     };
     Some((bits * 256.0) as i32)
 }

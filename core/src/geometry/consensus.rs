@@ -38,6 +38,8 @@ struct Candidate {
     /// Bits less what the best rival has.
     margin: f32,
     chosen: bool,
+    /// 1 for a chosen pair, -1 for one whose corner is chosen with another, 0 for an open one.
+    standing: f32,
 }
 
 /// The best two bits at a corner, to know the best rival of any of its candidates.
@@ -99,14 +101,22 @@ impl<const POINTS: usize, const PROPOSALS: usize, const CANDIDATES: usize> Conse
     /// out. Cost: a few rounds over all proposals and one sort of the candidates each.
     pub fn choose<'a>(
         &mut self,
-        proposals: impl Iterator<Item = &'a Proposal> + Clone,
+        proposals: impl Iterator<Item = &'a Proposal>,
         least: f32,
         mut chosen: impl FnMut(Supported),
     ) {
         self.enter(proposals);
         for round in 0..ROUNDS {
-            self.weigh(round == 0);
-            self.pick(if round + 1 < ROUNDS { LEAST_TO_VOUCH } else { least });
+            // Who stands as in the round before gets the same bits again; the first round asks nobody.
+            let changed = self.stand() || round <= 1;
+            if changed {
+                self.weigh(round == 0);
+            }
+            if round + 1 == ROUNDS {
+                self.pick(least);
+            } else if changed {
+                self.pick(LEAST_TO_VOUCH);
+            }
         }
         for &number in &self.order {
             if let Some(candidate) = self.candidates.get(usize::from(number)).filter(|candidate| candidate.chosen) {
@@ -115,31 +125,63 @@ impl<const POINTS: usize, const PROPOSALS: usize, const CANDIDATES: usize> Conse
         }
     }
 
-    /// Lists the different pairs, sorted, and each proposal's.
-    fn enter<'a>(&mut self, proposals: impl Iterator<Item = &'a Proposal> + Clone) {
+    /// Lists the different pairs, in the order in which they come, and each proposal's.
+    fn enter<'a>(&mut self, proposals: impl Iterator<Item = &'a Proposal>) {
         self.candidates.clear();
         self.proposals.clear();
+        // Until they are put in order, a table of the candidates' numbers, open to the next place.
+        self.order.clear();
+        let _ = self.order.resize(CANDIDATES, NONE);
         let points = u16::try_from(POINTS).unwrap_or(NONE);
         let fits = |proposal: &&Proposal| proposal.pairs.iter().all(|pair| pair.first < points && pair.second < points);
-        for proposal in proposals.clone().filter(fits).take(PROPOSALS) {
-            for &pair in &proposal.pairs {
-                if let Err(at) = self.find(pair) {
-                    let _ = self.candidates.insert(at, Candidate { pair, ..Candidate::default() });
-                }
-            }
-        }
         for proposal in proposals.filter(fits).take(PROPOSALS) {
             let mut numbers = [NONE; MOST_PAIRS];
             for (number, &pair) in numbers.iter_mut().zip(&proposal.pairs) {
-                *number = self.find(pair).map_or(NONE, |at| at as u16);
+                *number = self.number_of(pair);
             }
             let bits = proposal.surprise as f32 / 256.0;
             let _ = self.proposals.push((numbers, if bits < MOST_BITS { bits } else { MOST_BITS }));
         }
     }
 
-    fn find(&self, pair: Pairing) -> Result<usize, usize> {
-        self.candidates.binary_search_by(|candidate| candidate.pair.cmp(&pair))
+    /// The number of the candidate with this pair, which is entered if it is new; [`NONE`] if there is no room.
+    fn number_of(&mut self, pair: Pairing) -> u16 {
+        let mixed = (u32::from(pair.first) << 16 | u32::from(pair.second)).wrapping_mul(0x9e37_79b9);
+        // The upper half of the product, scaled to the length of the table.
+        let start = (u64::from(mixed) * CANDIDATES as u64) >> 32;
+        let (before, behind) = self.order.split_at_mut_checked(start as usize).unwrap_or_default();
+        for slot in behind.iter_mut().chain(before) {
+            match self.candidates.get(usize::from(*slot)) {
+                Some(candidate) if candidate.pair == pair => return *slot,
+                Some(_) => {}
+                None => {
+                    let number = self.candidates.len() as u16;
+                    let _ = self.candidates.push(Candidate { pair, ..Candidate::default() });
+                    *slot = number;
+                    return number;
+                }
+            }
+        }
+        NONE
+    }
+
+    /// Finds out how each candidate stands; whether that has changed.
+    fn stand(&mut self) -> bool {
+        let mut changed = false;
+        for candidate in &mut self.candidates {
+            let taken = |of: &[u16; POINTS], corner: u16| of.get(usize::from(corner)).is_some_and(|&by| by != NONE);
+            let Pairing { first, second } = candidate.pair;
+            let standing = if candidate.chosen {
+                1.0
+            } else if taken(&self.of_first, first) || taken(&self.of_second, second) {
+                -1.0
+            } else {
+                0.0
+            };
+            changed |= candidate.standing != standing;
+            candidate.standing = standing;
+        }
+        changed
     }
 
     /// Adds up the bits of each candidate.
@@ -148,17 +190,8 @@ impl<const POINTS: usize, const PROPOSALS: usize, const CANDIDATES: usize> Conse
             candidate.bits = 0.0;
         }
         for (numbers, bits) in &self.proposals {
-            // +1 for a chosen pair, -1 for one whose corner is chosen with another, 0 for an open one.
-            let standing = numbers.map(|number| {
-                let Some(candidate) = self.candidates.get(usize::from(number)) else { return 0.0 };
-                if candidate.chosen {
-                    return 1.0;
-                }
-                let taken = |of: &[u16; POINTS], corner: u16| of.get(usize::from(corner)).is_some_and(|&by| by != NONE);
-                let contradicted =
-                    taken(&self.of_first, candidate.pair.first) || taken(&self.of_second, candidate.pair.second);
-                if contradicted { -1.0 } else { 0.0 }
-            });
+            let standing = numbers
+                .map(|number| self.candidates.get(usize::from(number)).map_or(0.0, |candidate| candidate.standing));
             let sum = standing.iter().fold(0.0, |sum, one| sum + one);
             let others = numbers.iter().filter(|number| **number != NONE).count().max(2) as f32 - 1.0;
             for (number, own) in numbers.iter().zip(standing) {
@@ -197,14 +230,15 @@ impl<const POINTS: usize, const PROPOSALS: usize, const CANDIDATES: usize> Conse
                 (rival(&self.best_of_first, candidate.pair.first), rival(&self.best_of_second, candidate.pair.second));
             candidate.margin = candidate.bits - RIVALRY * if a > b { a } else { b };
             candidate.chosen = false;
-            if candidate.bits > 0.0 {
+            if candidate.bits > 0.0 && candidate.margin > least {
                 let _ = self.order.push(number);
             }
         }
         let candidates = &mut self.candidates;
         sort_by(&mut self.order, |a, b| {
-            let margin = |number: u16| candidates.get(usize::from(number)).map_or(0.0, |candidate| candidate.margin);
-            margin(*b).total_cmp(&margin(*a)).then(a.cmp(b)).is_lt()
+            let of = |number: u16| candidates.get(usize::from(number)).copied().unwrap_or_default();
+            let (a, b) = (of(*a), of(*b));
+            b.margin.total_cmp(&a.margin).then(a.pair.cmp(&b.pair)).is_lt()
         });
         self.of_first.fill(NONE);
         self.of_second.fill(NONE);
@@ -215,7 +249,6 @@ impl<const POINTS: usize, const PROPOSALS: usize, const CANDIDATES: usize> Conse
                 self.of_second.get_mut(usize::from(candidate.pair.second)),
             ) && *first == NONE
                 && *second == NONE
-                && candidate.margin > least
             {
                 (*first, *second, candidate.chosen) = (number, number, true);
             }

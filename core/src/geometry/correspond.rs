@@ -10,7 +10,7 @@ use super::epipolar::{AffineEpipolar, JointPoint};
 use super::error::GeometryError;
 use super::heap_sort::sort_by;
 use super::layers::HullLayers;
-use super::proposal::{Invariance, Pairing, Proposals, Terms};
+use super::proposal::{Invariance, Pairing, Proposal, Proposals, Terms};
 use super::shift::{self, LayerQuad};
 use crate::point::ImagePoint;
 
@@ -136,8 +136,8 @@ impl<const POINTS: usize, const LAYERS: usize, const PROPOSALS: usize, const CAN
 
     /// Finds the correspondences of two sets of corners; [`Self::found`] lists them.
     ///
-    /// `scratch` takes the arrangements of the second set ([`arrangement::scratch_length`]), `quads` those of its largest
-    /// layer ([`shift::quads_of`]).
+    /// `scratch` takes the arrangements of the second set ([`arrangement::scratch_length`]), `quads` the quads of its
+    /// layers and of the first set's largest ([`shift::quads_of`] the points of both sets is always enough).
     ///
     /// # Errors
     /// Too many points or layers for this workspace, or coordinates out of range. That there is no answer is not an
@@ -210,11 +210,7 @@ impl<const POINTS: usize, const LAYERS: usize, const PROPOSALS: usize, const CAN
         second_layers.peel(second)?;
         let Settings { terms, sources } = settings;
         if sources != Sources::Arrangements {
-            for (i, one) in (0_u8..).zip(first_layers.layers()) {
-                for (j, two) in (0_u8..).zip(second_layers.layers()).filter(|(j, _)| j.abs_diff(i) <= 1) {
-                    shift::propose((first, one, i), (second, two, j), terms, quads, |p| from_layers.add(p));
-                }
-            }
+            propose_layers((first, first_layers), (second, second_layers), terms, quads, |p| from_layers.add(p));
         }
         if sources != Sources::Layers {
             arrangement::propose(first, second, terms, scratch, |p| from_arrangements.add(p));
@@ -326,6 +322,39 @@ impl<const POINTS: usize, const LAYERS: usize, const PROPOSALS: usize, const CAN
     /// The proposals of local arrangements, most surprising first.
     pub const fn from_arrangements(&self) -> &Proposals<PROPOSALS> {
         &self.from_arrangements
+    }
+}
+
+/// Enters the proposals of each layer with those of the second set that are at most one farther in or out. Every layer is
+/// described once: those of the second set stay at the front of `quads`, each of the first set's comes behind them.
+fn propose_layers<const POINTS: usize, const LAYERS: usize>(
+    (first, first_layers): (&[ImagePoint], &HullLayers<POINTS, LAYERS>),
+    (second, second_layers): (&[ImagePoint], &HullLayers<POINTS, LAYERS>),
+    terms: Terms,
+    quads: &mut [LayerQuad],
+    mut found: impl FnMut(Proposal),
+) {
+    let mut ends: Vec<usize, LAYERS> = Vec::new();
+    let mut end = 0;
+    for (j, two) in (0_u8..).zip(second_layers.layers()) {
+        end += shift::describe((second, two, j), terms, quads.get_mut(end..).unwrap_or_default());
+        // There are as many ends as layers.
+        let _ = ends.push(end);
+    }
+    let (second_quads, rest) = quads.split_at_mut_checked(end).unwrap_or_default();
+    for (i, one) in (0_u8..).zip(first_layers.layers()) {
+        let layer = (first, one, i);
+        let count = shift::describe(layer, terms, rest);
+        let first_quads = rest.get(..count).unwrap_or_default();
+        let mut from = 0;
+        for ((j, two), &end) in (0_u8..).zip(second_layers.layers()).zip(&ends) {
+            if j.abs_diff(i) <= 1 {
+                let layer_quads = second_quads.get(from..end).unwrap_or_default();
+                let two = ((second, two, j), layer_quads);
+                shift::propose_described((layer, first_quads), two, terms, &mut found);
+            }
+            from = end;
+        }
     }
 }
 

@@ -7,7 +7,7 @@
 use heapless::Vec;
 
 use super::cross_ratio::FivePoints;
-use super::quad::Quad;
+use super::quad::Expected;
 use crate::math::log2;
 use crate::point::ImagePoint;
 
@@ -37,14 +37,14 @@ pub struct Terms {
 
 impl Terms {
     /// Bits of surprise that two quads agree up to an affine map; `None` if they do not.
-    pub(super) fn affine_bits(self, p: Quad, q: Quad) -> Option<f64> {
-        let deviation = p.deviation(&q, self.sigma)?;
-        (deviation.squared <= GATE).then(|| log2(self.area / (GATE * deviation.ellipse)))
+    pub(super) fn affine_bits(self, p: &Expected, q: [ImagePoint; 4]) -> Option<f64> {
+        let residual = p.residual(q)?;
+        (residual.squared <= GATE).then(|| log2(self.area / (GATE * p.ellipse(residual))))
     }
 
     /// Bits of surprise that five points agree up to a perspective map; `None` if they do not.
-    pub(super) fn perspective_bits(self, p: [ImagePoint; 5], q: [ImagePoint; 5]) -> Option<f64> {
-        let deviation = FivePoints::new(p)?.deviation(&FivePoints::new(q)?, self.sigma)?;
+    pub(super) fn perspective_bits(self, p: &FivePoints, q: [ImagePoint; 5]) -> Option<f64> {
+        let deviation = p.deviation(&FivePoints::new(q)?, self.sigma)?;
         (deviation.squared <= GATE).then(|| deviation.bits - log2(GATE))
     }
 }
@@ -93,59 +93,58 @@ pub struct Proposal {
 #[derive(Debug, Clone)]
 pub struct Proposals<const CAPACITY: usize> {
     list: Vec<Proposal, CAPACITY>,
+    /// The surprise and the place in the list of each.
+    order: Vec<(i32, u16), CAPACITY>,
     seen: usize,
 }
 
 impl<const CAPACITY: usize> Proposals<CAPACITY> {
     /// None yet.
     pub const fn new() -> Self {
-        Self { list: Vec::new(), seen: 0 }
+        const { assert!(CAPACITY <= u16::MAX as usize, "a proposal has 16 bits for its place") };
+        Self { list: Vec::new(), order: Vec::new(), seen: 0 }
     }
 
     /// Forgets all.
     pub fn clear(&mut self) {
         self.list.clear();
+        self.order.clear();
         self.seen = 0;
     }
 
-    /// Enters a proposal. Cost: at most `CAPACITY` moves.
+    /// Enters a proposal. Cost: at most `CAPACITY` moves of 8 bytes.
     pub fn add(&mut self, proposal: Proposal) {
         self.seen = self.seen.saturating_add(1);
+        let mut entry = (proposal.surprise, self.list.len() as u16);
         if self.list.is_full() {
-            if self.list.last().is_none_or(|weakest| weakest.surprise >= proposal.surprise) {
+            let Some(&(weakest, place)) = self.order.last() else { return };
+            if weakest >= proposal.surprise {
                 return;
             }
-            self.list.pop();
+            self.order.pop();
+            entry.1 = place;
+            if let Some(weakest) = self.list.get_mut(usize::from(place)) {
+                *weakest = proposal;
+            }
+        } else {
+            // There is room, or the capacity is zero and nothing can be kept.
+            let _ = self.list.push(proposal);
         }
-        // There is room now, or the capacity is zero and nothing can be kept.
-        let _ = self.list.push(proposal);
-        let mut at = self.list.len();
-        while at > 1
-            && let Some([before, after]) = self.list.get_mut(at - 2..at)
-            && before.surprise < after.surprise
-        {
-            core::mem::swap(before, after);
-            at -= 1;
+        let at = self.order.partition_point(|(surprise, _)| *surprise >= entry.0);
+        for later in self.order.iter_mut().skip(at) {
+            core::mem::swap(later, &mut entry);
         }
+        let _ = self.order.push(entry);
     }
 
     /// The proposals, most surprising first.
-    pub fn iter(&self) -> core::slice::Iter<'_, Proposal> {
-        self.list.iter()
+    pub fn iter(&self) -> impl Iterator<Item = &Proposal> + Clone {
+        self.order.iter().filter_map(|(_, place)| self.list.get(usize::from(*place)))
     }
 
     /// How many were offered, kept or not.
     pub const fn seen(&self) -> usize {
         self.seen
-    }
-}
-
-impl<'a, const CAPACITY: usize> IntoIterator for &'a Proposals<CAPACITY> {
-    type Item = &'a Proposal;
-    type IntoIter = core::slice::Iter<'a, Proposal>;
-
-    fn into_iter(self) -> Self::IntoIter {
-        self.iter()
     }
 }
 

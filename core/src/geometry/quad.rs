@@ -43,6 +43,12 @@ impl AreaRatio {
         if self.lower == 0 || other.lower == 0 || self.upper == 0 {
             return false;
         }
+        if [self.upper, self.lower, other.upper, other.lower].iter().all(|area| area.unsigned_abs() <= 1 << 30) {
+            let straight = self.upper * other.lower;
+            let difference = straight - other.upper * self.lower;
+            return u128::from(difference.unsigned_abs()) * u128::from(eps.whole)
+                < u128::from(straight.unsigned_abs()) * u128::from(eps.part);
+        }
         let straight = i128::from(self.upper).saturating_mul(i128::from(other.lower));
         let crossed = i128::from(other.upper).saturating_mul(i128::from(self.lower));
         let difference = straight.saturating_sub(crossed).saturating_abs();
@@ -125,59 +131,127 @@ impl Quad {
     /// `sigma² |l|² (1 + L L^T)` with `L` the linear part of the map: this is both invariants at once, thin triangles included.
     /// `None` for a mirror image, and for quads without any area.
     pub fn deviation(&self, other: &Self, sigma: f32) -> Option<Deviation> {
+        let expected = Expected::new(self, sigma);
+        let residual = expected.residual(other.points)?;
+        Some(Deviation { squared: residual.squared, ellipse: expected.ellipse(residual) })
+    }
+}
+
+/// What a quad expects of its affine images, worked out once for many of them: see [`Quad::deviation`].
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Expected {
+    /// The affine dependency `l`, px².
+    weights: [f64; 4],
+    /// `sigma² |l|²`.
+    variance: f64,
+    /// The largest weight, and whose it is: the point that the three others hold best.
+    most: f64,
+    held: Held,
+    triangle: Triangle,
+}
+
+#[derive(Debug, Clone, Copy)]
+enum Held {
+    First,
+    Second,
+    Third,
+    Fourth,
+}
+
+/// What is left of an affine image when the dependency is applied to it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Residual {
+    /// Squared Mahalanobis distance.
+    pub(super) squared: f64,
+    /// Of `1 + L L^T`.
+    determinant: f64,
+}
+
+impl Expected {
+    /// For noise of `sigma` px on each coordinate.
+    pub(super) fn new(quad: &Quad, sigma: f32) -> Self {
         let unit = f64::from(SUBPIXEL);
-        let [t0, t1, t2, t3] = self.areas.map(|area| area as f64 / (unit * unit));
+        let [t0, t1, t2, t3] = quad.areas.map(|area| area as f64 / (unit * unit));
         let weights = [t1, -t2, t3, -t0];
-        let [p0, p1, p2, p3] = self.points.map(|p| [f64::from(p.x) / unit, f64::from(p.y) / unit]);
-        let [q0, q1, q2, q3] = other.points.map(|p| [f64::from(p.x) / unit, f64::from(p.y) / unit]);
-        // The point with the largest weight is the one that the three others hold best.
-        let (p, q, at) = {
-            let mut at = 0;
-            let mut most = t1.abs();
-            for (number, weight) in [(1, t2.abs()), (2, t3.abs()), (3, t0.abs())] {
-                if weight > most {
-                    (at, most) = (number, weight);
-                }
+        let (mut held, mut most, mut magnitude) = (Held::First, t1, t1.abs());
+        for (other, weight) in [(Held::Second, t2), (Held::Third, t3), (Held::Fourth, t0)] {
+            if weight.abs() > magnitude {
+                (held, most, magnitude) = (other, weight, weight.abs());
             }
-            match at {
-                0 => ([p1, p2, p3], [q1, q2, q3], t1),
-                1 => ([p2, p3, p0], [q2, q3, q0], t2),
-                2 => ([p3, p0, p1], [q3, q0, q1], t3),
-                _ => ([p0, p1, p2], [q0, q1, q2], t0),
-            }
-        };
-        let linear = linear_part(p, q)?;
+        }
+        let norm = weights.iter().fold(0.0, |sum, weight| sum + weight * weight);
+        let variance = f64::from(sigma) * f64::from(sigma) * norm;
+        Self { weights, variance, most, held, triangle: Triangle::new(held.others(quad.points.map(pixels))) }
+    }
+
+    /// How far the images of the four points are from the dependency; `None` for a mirror image, and without any area.
+    pub(super) fn residual(&self, images: [ImagePoint; 4]) -> Option<Residual> {
+        let images = images.map(pixels);
+        let [[a, b], [c, d]] = self.triangle.linear_part(self.held.others(images))?;
+        let [q0, q1, q2, q3] = images;
         let relative = |point: [f64; 2]| [point[0] - q3[0], point[1] - q3[1]];
         // The weights add up to zero: any origin will do, and a near one keeps the digits.
         let [x, y] = [q0, q1, q2]
             .map(relative)
             .into_iter()
-            .zip(weights)
+            .zip(self.weights)
             .fold([0.0, 0.0], |[x, y], (q, weight)| [x + weight * q[0], y + weight * q[1]]);
-        let norm = weights.iter().fold(0.0, |sum, weight| sum + weight * weight);
-        let variance = f64::from(sigma) * f64::from(sigma) * norm;
-        let [[a, b], [c, d]] = linear;
         let (xx, xy, yy) = (1.0 + a * a + b * b, a * c + b * d, 1.0 + c * c + d * d);
         let determinant = xx * yy - xy * xy;
-        if !(variance > 0.0 && determinant > 0.0) {
+        if !(self.variance > 0.0 && determinant > 0.0) {
             return None;
         }
-        let squared = (yy * x * x - 2.0 * xy * x * y + xx * y * y) / (determinant * variance);
-        let ellipse = core::f64::consts::PI * variance * crate::math::sqrt_f64(determinant) / (at * at);
-        Some(Deviation { squared, ellipse })
+        let squared = (yy * x * x - 2.0 * xy * x * y + xx * y * y) / (determinant * self.variance);
+        Some(Residual { squared, determinant })
+    }
+
+    /// Area in px² of the one-sigma ellipse in which the least certain point is expected.
+    pub(super) fn ellipse(&self, residual: Residual) -> f64 {
+        let root = crate::math::sqrt_f64(residual.determinant);
+        core::f64::consts::PI * self.variance * root / (self.most * self.most)
     }
 }
 
-/// `L` of the affine map of three points to three others; `None` for collinear points and mirror images.
-fn linear_part(from: [[f64; 2]; 3], to: [[f64; 2]; 3]) -> Option<[[f64; 2]; 2]> {
-    let edges = |[o, a, b]: [[f64; 2]; 3]| [[a[0] - o[0], a[1] - o[1]], [b[0] - o[0], b[1] - o[1]]];
-    let ([[ux, uy], [vx, vy]], [[gx, gy], [hx, hy]]) = (edges(from), edges(to));
-    let area = ux * vy - uy * vx;
-    if area == 0.0 || !((gx * hy - gy * hx) / area > 0.0) {
-        return None;
+impl Held {
+    /// The other three points, in cyclic order.
+    const fn others<T: Copy>(self, [a, b, c, d]: [T; 4]) -> [T; 3] {
+        match self {
+            Self::First => [b, c, d],
+            Self::Second => [c, d, a],
+            Self::Third => [d, a, b],
+            Self::Fourth => [a, b, c],
+        }
     }
-    Some([
-        [(gx * vy - hx * uy) / area, (hx * ux - gx * vx) / area],
-        [(gy * vy - hy * uy) / area, (hy * ux - gy * vx) / area],
-    ])
+}
+
+fn pixels(point: ImagePoint) -> [f64; 2] {
+    let unit = f64::from(SUBPIXEL);
+    [f64::from(point.x) / unit, f64::from(point.y) / unit]
+}
+
+/// Two edges of a triangle and twice its area, px.
+#[derive(Debug, Clone, Copy)]
+struct Triangle {
+    edges: [[f64; 2]; 2],
+    area: f64,
+}
+
+impl Triangle {
+    fn new([o, a, b]: [[f64; 2]; 3]) -> Self {
+        let edges @ [[ux, uy], [vx, vy]] = [[a[0] - o[0], a[1] - o[1]], [b[0] - o[0], b[1] - o[1]]];
+        Self { edges, area: ux * vy - uy * vx }
+    }
+
+    /// `L` of the affine map to three other points; `None` for collinear points and mirror images.
+    fn linear_part(&self, to: [[f64; 2]; 3]) -> Option<[[f64; 2]; 2]> {
+        let Self { edges: [[ux, uy], [vx, vy]], area } = *self;
+        let Self { edges: [[gx, gy], [hx, hy]], area: image } = Self::new(to);
+        if area == 0.0 || !(image / area > 0.0) {
+            return None;
+        }
+        Some([
+            [(gx * vy - hx * uy) / area, (hx * ux - gx * vx) / area],
+            [(gy * vy - hy * uy) / area, (hy * ux - gy * vx) / area],
+        ])
+    }
 }

@@ -8,7 +8,7 @@ use heapless::Vec;
 
 use super::cross_ratio::FivePoints;
 use super::proposal::{Invariance, Origin, Pairing, Proposal, Terms};
-use super::quad::{AreaRatio, Quad, Tolerance};
+use super::quad::{AreaRatio, Expected, Quad, Tolerance};
 use crate::math::log2;
 use crate::point::ImagePoint;
 
@@ -53,9 +53,36 @@ fn vertices<const COUNT: usize>(
     Some((numbers, places))
 }
 
-/// The thesis' I(k) of four vertices in a row.
-fn plain_ratio(points: &[ImagePoint], layer: &[u16], start: usize) -> Option<AreaRatio> {
-    vertices(points, layer, start, CHOICES[0]).map(|(_, places)| Quad::new(places).ratio())
+/// The thesis' I(k) of four vertices in a row from each start of a layer, the first `POINTS` of them remembered.
+struct PlainRatios<'a, const POINTS: usize> {
+    points: &'a [ImagePoint],
+    layer: &'a [u16],
+    known: Vec<AreaRatio, POINTS>,
+}
+
+impl<'a, const POINTS: usize> PlainRatios<'a, POINTS> {
+    fn new((points, layer): (&'a [ImagePoint], &'a [u16])) -> Self {
+        let mut ratios = Self { points, layer, known: Vec::new() };
+        for start in 0..layer.len().min(POINTS) {
+            let _ = ratios.known.push(ratios.compute(start));
+        }
+        ratios
+    }
+
+    fn at(&self, start: usize) -> AreaRatio {
+        self.known.get(start).copied().unwrap_or_else(|| self.compute(start))
+    }
+
+    /// Without area, which agrees with nothing, for a vertex that is no point.
+    fn compute(&self, start: usize) -> AreaRatio {
+        let quad = vertices(self.points, self.layer, start, CHOICES[0]);
+        quad.map_or(AreaRatio { upper: 0, lower: 0 }, |(_, places)| Quad::new(places).ratio())
+    }
+}
+
+/// `at` in a cycle of `length`, for `at < 2 length`.
+const fn around(at: usize, length: usize) -> usize {
+    if at < length { at } else { at - length }
 }
 
 /// The thesis' circular shift (5.3): the vertices that follow one another from a start in each layer such that most of
@@ -76,10 +103,8 @@ pub fn plain_shift<const POINTS: usize>(
     if shorter < 4 {
         return None;
     }
-    let agrees = |k: usize, l: usize| {
-        let ratios = (plain_ratio(first.0, first.1, k % length), plain_ratio(second.0, second.1, l % modulus));
-        matches!(ratios, (Some(one), Some(two)) if one.agrees(two, eps))
-    };
+    let (one, two) = (PlainRatios::<POINTS>::new(first), PlainRatios::<POINTS>::new(second));
+    let agrees = |k: usize, l: usize| one.at(around(k, length)).agrees(two.at(around(l, modulus)), eps);
     let numbers = |(k, l): (usize, usize)| (first.1.get(k), second.1.get(l));
     let (mut best, mut quads) = ((0, 0), 0);
     for k in 0..length {
@@ -127,25 +152,31 @@ pub const fn quads_of(vertices: usize) -> usize {
     vertices * CHOICES_OF_FIVE.len()
 }
 
-fn describe(
-    points: &[ImagePoint],
-    layer: &[u16],
-    sigma: f32,
-    invariance: Invariance,
-    mut entry: impl FnMut(LayerQuad),
-) {
+/// A layer: its points, the numbers of its vertices (clockwise), and its own number.
+pub type NumberedLayer<'a> = (&'a [ImagePoint], &'a [u16], u8);
+
+/// Describes a layer: its quads go to the front of `quads`, the last are left out where there is no room. Returns how many
+/// there are. Layers described once are compared by [`propose_described`].
+pub fn describe((points, layer, _): NumberedLayer<'_>, terms: Terms, quads: &mut [LayerQuad]) -> usize {
     let spread = |uncertainty: f64| {
         (uncertainty <= MOST_UNCERTAIN).then_some((3.0 * core::f64::consts::LOG2_E * uncertainty) as f32)
     };
+    let mut count = 0;
+    let mut enter = |quad: LayerQuad| {
+        if let Some(place) = quads.get_mut(count) {
+            *place = quad;
+            count += 1;
+        }
+    };
     for start in 0..layer.len() {
-        if invariance == Invariance::Perspective {
+        if terms.invariance == Invariance::Perspective {
             for choice in CHOICES_OF_FIVE {
                 let Some((vertices, places)) = vertices(points, layer, start, choice) else { continue };
                 if let Some(five) = FivePoints::new(places)
-                    && let Some(spread) = spread(five.key_uncertainty(sigma))
+                    && let Some(spread) = spread(five.key_uncertainty(terms.sigma))
                 {
                     let key = (five.key() * core::f64::consts::LOG2_E) as f32;
-                    entry(LayerQuad { vertices, invariants: [key, 0.0], spread, start: start as u16 });
+                    enter(LayerQuad { vertices, invariants: [key, 0.0], spread, start: start as u16 });
                 }
             }
             continue;
@@ -153,52 +184,59 @@ fn describe(
         for choice in CHOICES {
             let Some(([a, b, c, d], places)) = vertices(points, layer, start, choice) else { continue };
             let quad = Quad::new(places);
-            if let Some(spread) = spread(quad.ratio_uncertainty(sigma)) {
+            if let Some(spread) = spread(quad.ratio_uncertainty(terms.sigma)) {
                 let log = |ratio: AreaRatio| log2((ratio.upper as f64 / ratio.lower as f64).abs()) as f32;
                 let invariants = [log(quad.ratio()), log(quad.second_ratio())];
-                entry(LayerQuad { vertices: [a, b, c, d, d], invariants, spread, start: start as u16 });
+                enter(LayerQuad { vertices: [a, b, c, d, d], invariants, spread, start: start as u16 });
             }
         }
     }
+    count
 }
 
 /// Finds quads of two layers that a map could have taken to one another: four vertices by affine invariants, or five by
 /// cross-ratios.
 ///
-/// A layer is its points, the numbers of its vertices (clockwise), and its own number. `scratch` takes the quads of the
-/// second layer ([`quads_of`]; with less, the last are left out). Quads may leave out one vertex on either side, so one
-/// lost and one extra vertex within five are bridged; what lies beyond is found by the map. Mirror images are refused.
+/// `scratch` takes the quads of both layers ([`quads_of`] all their vertices; with less, the last of the second are left
+/// out). Quads may leave out one vertex on either side, so one lost and one extra vertex within five are bridged; what lies
+/// beyond is found by the map. Mirror images are refused.
 ///
 /// Cost: `16 m n` (perspective: 25) comparisons of two numbers, a few multiplications for each that is near.
 pub fn propose(
-    first: (&[ImagePoint], &[u16], u8),
-    second: (&[ImagePoint], &[u16], u8),
+    first: NumberedLayer<'_>,
+    second: NumberedLayer<'_>,
     terms: Terms,
     scratch: &mut [LayerQuad],
+    found: impl FnMut(Proposal),
+) {
+    let count = describe(first, terms, scratch);
+    let (one, rest) = scratch.split_at_mut_checked(count).unwrap_or_default();
+    let count = describe(second, terms, rest);
+    propose_described((first, one), (second, rest.get(..count).unwrap_or_default()), terms, found);
+}
+
+/// [`propose`] for layers with the quads by which [`describe`] describes them.
+pub fn propose_described(
+    (first, first_quads): (NumberedLayer<'_>, &[LayerQuad]),
+    (second, second_quads): (NumberedLayer<'_>, &[LayerQuad]),
+    terms: Terms,
     mut found: impl FnMut(Proposal),
 ) {
-    let mut count = 0;
-    describe(second.0, second.1, terms.sigma, terms.invariance, |quad| {
-        if let Some(place) = scratch.get_mut(count) {
-            *place = quad;
-            count += 1;
-        }
-    });
-    let quads = scratch.get(..count).unwrap_or_default();
     let modulus = second.1.len().max(1);
-    describe(first.0, first.1, terms.sigma, terms.invariance, |one| {
-        for two in quads {
+    let place = |points: &[ImagePoint], number: u16| points.get(usize::from(number)).copied().unwrap_or_default();
+    for one in first_quads {
+        let mut wanted = None;
+        for two in second_quads {
             let reach = one.spread + two.spread;
-            let near = (one.invariants[0] - two.invariants[0]).abs() <= reach
-                && (one.invariants[1] - two.invariants[1]).abs() <= 2.0 * reach;
+            let near = ((one.invariants[0] - two.invariants[0]).abs() <= reach)
+                & ((one.invariants[1] - two.invariants[1]).abs() <= 2.0 * reach);
             if !near {
                 continue;
             }
-            let place =
-                |points: &[ImagePoint], number: u16| points.get(usize::from(number)).copied().unwrap_or_default();
-            let one_places = one.vertices.map(|number| place(first.0, number));
-            let two_places = two.vertices.map(|number| place(second.0, number));
-            let Some((surprise, count)) = compare(one_places, two_places, terms) else { continue };
+            let wanted =
+                wanted.get_or_insert_with(|| Wanted::new(one.vertices.map(|number| place(first.0, number)), terms));
+            let images = two.vertices.map(|number| place(second.0, number));
+            let Some((surprise, count)) = wanted.compare(images, terms) else { continue };
             let mut pairs = Vec::new();
             for (&first, &second) in one.vertices.iter().zip(&two.vertices).take(count) {
                 let _ = pairs.push(Pairing { first, second });
@@ -207,17 +245,31 @@ pub fn propose(
             let origin = Origin::Layers { first: first.2, second: second.2, shift: shift as u16 };
             found(Proposal { pairs, surprise, origin });
         }
-    });
+    }
 }
 
-/// The surprise in 1/256 bit, and how many vertices were compared; `None` if they do not agree.
-fn compare(p: [ImagePoint; 5], q: [ImagePoint; 5], terms: Terms) -> Option<(i32, usize)> {
-    let (bits, count) = match terms.invariance {
-        Invariance::Affine => {
-            let ([p0, p1, p2, p3, _], [q0, q1, q2, q3, _]) = (p, q);
-            (terms.affine_bits(Quad::new([p0, p1, p2, p3]), Quad::new([q0, q1, q2, q3]))?, 4)
+/// What is compared of a quad of the first layer, worked out once.
+enum Wanted {
+    Affine(Expected),
+    Perspective(Option<FivePoints>),
+}
+
+impl Wanted {
+    fn new(places: [ImagePoint; 5], terms: Terms) -> Self {
+        let [a, b, c, d, _] = places;
+        match terms.invariance {
+            Invariance::Affine => Self::Affine(Expected::new(&Quad::new([a, b, c, d]), terms.sigma)),
+            Invariance::Perspective => Self::Perspective(FivePoints::new(places)),
         }
-        Invariance::Perspective => (terms.perspective_bits(p, q)?, 5),
-    };
-    Some(((bits * 256.0) as i32, count))
+    }
+
+    /// The surprise in 1/256 bit, and how many vertices were compared; `None` if they do not agree.
+    fn compare(&self, images: [ImagePoint; 5], terms: Terms) -> Option<(i32, usize)> {
+        let [a, b, c, d, _] = images;
+        let (bits, count) = match self {
+            Self::Affine(expected) => (terms.affine_bits(expected, [a, b, c, d])?, 4),
+            Self::Perspective(five) => (terms.perspective_bits(five.as_ref()?, images)?, 5),
+        };
+        Some(((bits * 256.0) as i32, count))
+    }
 }

@@ -130,7 +130,7 @@ impl Default for Matcher {
         Self {
             workspace: Box::default(),
             arrangements: vec![Arrangement::default(); scratch_length(MOST_CORNERS)],
-            quads: vec![LayerQuad::default(); quads_of(MOST_CORNERS)],
+            quads: vec![LayerQuad::default(); quads_of(2 * MOST_CORNERS)],
         }
     }
 }

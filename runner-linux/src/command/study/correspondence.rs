@@ -258,7 +258,7 @@ impl Matcher {
             workspace: Box::new(const { Workspace::new() }),
             layers: Box::new([const { Layers::new() }; 2]),
             arrangements: vec![Arrangement::default(); scratch_length(POINTS)],
-            quads: vec![LayerQuad::default(); quads_of(POINTS)],
+            quads: vec![LayerQuad::default(); quads_of(2 * POINTS)],
         }
     }
 
