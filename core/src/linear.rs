@@ -38,6 +38,11 @@ impl<const UNKNOWNS: usize> NormalEquations<UNKNOWNS> {
         }
     }
 
+    /// Puts another right side under the same equations: unit vectors give the columns of the inverse.
+    pub fn set_right(&mut self, right: [f64; UNKNOWNS]) {
+        self.right = right;
+    }
+
     /// The unknowns; `None` if the equations do not determine them, or hold a NaN. The solution takes the equations'
     /// place, so that nothing is copied: they are of no use afterwards.
     pub fn solve(&mut self) -> Option<&[f64; UNKNOWNS]> {
