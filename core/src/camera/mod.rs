@@ -9,7 +9,9 @@ mod intrinsics;
 mod placement;
 mod posit;
 mod solve;
-mod space;
+pub(crate) mod space;
+pub mod direction;
+pub mod facade;
 pub mod pose;
 pub mod weak_perspective;
 

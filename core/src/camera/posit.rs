@@ -47,25 +47,45 @@ impl Orthography {
         depth.is_finite().then(|| CameraFromModel::of_parts([right, down, cross(right, down)], translation))
     }
 
-    /// With what a flat model leaves open: `right + l n`, `down + m n`, where `l m = -right . down` and
-    /// `l^2 - m^2 = down^2 - right^2`, that is `(l + i m)^2 = down^2 - right^2 - 2 i right . down`.
-    fn completed(&self, normal: Vector) -> [Self; 2] {
+    /// The parts `l` and `m` of right and down along the normal, which a flat model leaves open: `l m = -right . down` and
+    /// `l^2 - m^2 = down^2 - right^2`, that is `(l + i m)^2 = down^2 - right^2 - 2 i right . down`. Both signs do.
+    fn open_parts(&self) -> [f64; 2] {
         let real = dot(self.down, self.down) - dot(self.right, self.right);
         let imaginary = -2.0 * dot(self.right, self.down);
         let modulus = sqrt_f64(real * real + imaginary * imaginary);
         // The larger part of the root first: the other follows by a division that loses nothing.
-        let (l, m) = if real >= 0.0 {
+        if real >= 0.0 {
             let l = sqrt_f64((modulus + real) / 2.0);
-            (l, if l > 0.0 { imaginary / (2.0 * l) } else { 0.0 })
+            [l, if l > 0.0 { imaginary / (2.0 * l) } else { 0.0 }]
         } else {
             let m = sqrt_f64((modulus - real) / 2.0);
-            (imaginary / (2.0 * m), m)
-        };
-        [1.0, -1.0].map(|sign| Self {
-            right: plus(self.right, scaled(normal, sign * l)),
-            down: plus(self.down, scaled(normal, sign * m)),
-            at: self.at,
-        })
+            [imaginary / (2.0 * m), m]
+        }
+    }
+
+    /// The pose with these parts along the normal: its rows are orthogonal and equally long up to rounding.
+    fn completed(&self, normal: Vector, [l, m]: [f64; 2]) -> Option<CameraFromModel> {
+        let (right, down) = (plus(self.right, scaled(normal, l)), plus(self.down, scaled(normal, m)));
+        let depth = 1.0 / sqrt_f64(dot(right, right));
+        let (right, down) = (scaled(right, depth), scaled(down, depth));
+        let translation = [self.at[0] * depth, self.at[1] * depth, depth];
+        depth.is_finite().then(|| CameraFromModel::of_parts([right, down, cross(right, down)], translation))
+    }
+
+    /// Both completions.
+    fn both(&self, normal: Vector) -> [Option<CameraFromModel>; 2] {
+        let [l, m] = self.open_parts();
+        [self.completed(normal, [l, m]), self.completed(normal, [-l, -m])]
+    }
+
+    /// The completion that is turned like the pose before: only what changes with the sign is compared, of
+    /// `trace(A B^T)`.
+    fn nearer(&self, normal: Vector, before: &CameraFromModel) -> Option<CameraFromModel> {
+        let [l, m] = self.open_parts();
+        let [right, down, axis] = *before.rotation();
+        let turned = plus(scaled(cross(self.right, normal), m), scaled(cross(normal, self.down), l));
+        let same = l * dot(normal, right) + m * dot(normal, down) + dot(turned, axis) * before.translation()[2];
+        self.completed(normal, if same >= 0.0 { [l, m] } else { [-l, -m] })
     }
 }
 
@@ -74,14 +94,6 @@ impl Orthography {
 fn depth_ratio(pose: &CameraFromModel, point: Vector) -> Option<f64> {
     let ratio = 1.0 + dot(pose.axis(), point) / pose.translation()[2];
     (ratio > 1e-3).then_some(ratio)
-}
-
-/// Of two completions the one that is turned like the pose before.
-fn nearer(pose: &CameraFromModel, pair: [Orthography; 2]) -> Option<CameraFromModel> {
-    match pair.map(|one| one.place()) {
-        [Some(one), Some(two)] => Some(if one.cosine_to(pose) >= two.cosine_to(pose) { one } else { two }),
-        [one, two] => one.or(two),
-    }
 }
 
 /// The points about their centroid, with what POSIT needs of them.
@@ -135,10 +147,10 @@ impl Shape<'_> {
         let inverse = self.inverse(true);
         let [.., normal] = self.axes.directions;
         let Some(first) = self.orthography(&inverse, None) else { return [None; 2] };
-        first.completed(normal).map(|start| {
-            let mut pose = start.place()?;
+        first.both(normal).map(|start| {
+            let mut pose = start?;
             for _ in 0..ROUNDS {
-                pose = nearer(&pose, self.orthography(&inverse, Some(&pose))?.completed(normal))?;
+                pose = self.orthography(&inverse, Some(&pose))?.nearer(normal, &pose)?;
             }
             Some(pose)
         })
@@ -164,10 +176,10 @@ pub(super) fn of_three([first, second, third]: [Sight; 3]) -> [Option<CameraFrom
         let ([x, y], [xa, ya], [xb, yb]) = (first.ray, second.ray, third.ray);
         Orthography { right: part(x, xa, xb), down: part(y, ya, yb), at: first.ray }
     };
-    orthography(1.0, 1.0).completed(normal).map(|start| {
-        let mut pose = start.place()?;
+    orthography(1.0, 1.0).both(normal).map(|start| {
+        let mut pose = start?;
         for _ in 0..ROUNDS_OF_THREE {
-            pose = nearer(&pose, orthography(depth_ratio(&pose, a)?, depth_ratio(&pose, b)?).completed(normal))?;
+            pose = orthography(depth_ratio(&pose, a)?, depth_ratio(&pose, b)?).nearer(normal, &pose)?;
         }
         Some(pose.about(scaled(first.point, -1.0)))
     })
