@@ -1,7 +1,7 @@
 //! The camera's pose from corners with known places: exact ones, noisy ones, wrong ones, and too little of them.
 
 use daymark_core::camera::pose::{NoPose, PointInView, Pose, PoseSettings, PoseSolver};
-use daymark_core::camera::{CameraFromModel, Intrinsics};
+use daymark_core::camera::Intrinsics;
 use daymark_fixtures::distort::Distortion;
 use daymark_fixtures::{Camera, Clutter, Lens, Scene, SeenCorner, Site, Stand, Tower, corners_of};
 

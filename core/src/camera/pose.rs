@@ -158,6 +158,13 @@ pub enum NoPose {
         /// All.
         points: usize,
     },
+    /// One plane of the model fits and nothing beside it: a mirror image, or another building with a facade like it.
+    OnePlane {
+        /// Correspondences on the plane that agree.
+        inliers: usize,
+        /// Correspondences off the plane, none of which agrees.
+        off_plane: usize,
+    },
     /// Chance would do as well.
     ByChance {
         /// Correspondences that agree.
@@ -189,6 +196,10 @@ impl fmt::Display for NoPose {
             Self::NoConsensus { inliers, points } => {
                 write!(f, "only {inliers} of {points} corners fit one position: another building, or too many wrong matches")
             }
+            Self::OnePlane { inliers, off_plane } => write!(
+                f,
+                "{inliers} corners of one plane fit a position, and none of {off_plane} beside it: a mirror image, or another building"
+            ),
             Self::ByChance { inliers, log2_chance } => {
                 write!(f, "{inliers} corners fit one position, which chance does too (log2 {log2_chance:.1})")
             }

@@ -4,8 +4,8 @@ use super::adjust::{Problem, Weighting, of_centre};
 use super::draw;
 use super::placement::CameraFromModel;
 use super::pose::{LEAST_POINTS, NoPose, Pose, PoseSettings};
-use super::posit::Shape;
-use super::space::{Axes, Vector, dot, length, minus};
+use super::posit::{Shape, Sight};
+use super::space::{Axes, Vector, axes, dot, length, minus, plus, scaled};
 use super::weak_perspective::{ErrorBound, Extent, TooDeep, WeakPerspective};
 use crate::math::{log2, sqrt_f64};
 
@@ -27,6 +27,10 @@ const NEARLY_ALL: f64 = 0.9;
 const RIVAL_WITHIN: f64 = 13.815_510_557_964_274;
 /// Two poses are one if their centres are closer than this, in deviations of the centre.
 const SAME_WITHIN: f64 = 3.0;
+/// A point lies beside a plane if it is farther from it than this share of the second deviation of the points on it.
+const BESIDE: f64 = 0.1;
+/// So many points beside a plane, all of them wrong, are no accident: 3 in 1,000 if a third of all correspondences are wrong.
+const WITNESSES: usize = 5;
 /// A model seen edge-on has an image thinner than this, in deviations.
 const THIN: f64 = 2.0;
 /// The position is left open if its deviation is more than this share of the range.
@@ -55,9 +59,9 @@ impl<'a> Question<'a> {
     }
 
     /// The pose, with the model's axes and the centroid in its own frame.
-    pub(super) fn answer(mut self, axes: &Axes, centroid: Vector) -> Result<Pose, NoPose> {
-        let flatness = sqrt_f64(axes.values[2] / axes.values[1]);
-        let shape = Shape { sights: self.problem.sights, axes };
+    pub(super) fn answer(mut self, model: &Axes, centroid: Vector) -> Result<Pose, NoPose> {
+        let flatness = sqrt_f64(model.values[2] / model.values[1]);
+        let shape = Shape { sights: self.problem.sights, axes: model };
         let settled = self.from_all(shape, flatness).or_else(|| self.from_draws());
         let points = self.problem.sights.len();
         let Some(settled) = settled.filter(|settled| self.stands(settled)) else {
@@ -70,11 +74,12 @@ impl<'a> Question<'a> {
                     .is_some_and(|other| self.stands(&other));
             return Err(if behind { NoPose::Mirrored } else { NoPose::NoConsensus { inliers, points } });
         };
+        self.beside_plane(&settled)?;
         let across_px = self.thickness(&settled.pose);
         if !(across_px > THIN * self.settings.deviation_px) {
             return Err(NoPose::EdgeOn { across_px });
         }
-        let other = (flatness < RATHER_FLAT).then(|| self.other_side(&settled, axes)).flatten();
+        let other = (flatness < RATHER_FLAT).then(|| self.other_side(&settled, model)).flatten();
         match other {
             Some(other) if other.cost < settled.cost => self.judge(other, Some(settled), centroid),
             other => self.judge(settled, other, centroid),
@@ -134,9 +139,32 @@ impl<'a> Question<'a> {
     }
 
     /// The pose on the other side of a rather flat model.
-    fn other_side(&self, settled: &Settled, axes: &Axes) -> Option<Settled> {
-        let [.., normal] = axes.directions;
+    fn other_side(&self, settled: &Settled, model: &Axes) -> Option<Settled> {
+        let [.., normal] = model.directions;
         self.settle(settled.pose.reversed(normal)?).filter(|other| self.stands(other))
+    }
+
+    /// Refuses a pose that only the points of one plane agree with, if there are others to tell.
+    fn beside_plane(&self, settled: &Settled) -> Result<(), NoPose> {
+        let agrees = |sight: &Sight| self.problem.distance_squared(&settled.pose, sight) <= self.gate_squared;
+        let inside = || self.problem.sights.iter().filter(|sight| agrees(sight));
+        let share = 1.0 / settled.inside.max(1) as f64;
+        let middle = inside().fold([0.0; 3], |sum, sight| plus(sum, scaled(sight.point, share)));
+        let mut scatter = [[0.0; 3]; 3];
+        for sight in inside() {
+            let off = minus(sight.point, middle);
+            for (row, entry) in scatter.iter_mut().zip(off) {
+                *row = plus(*row, scaled(off, entry * share));
+            }
+        }
+        let Axes { values: [_, width, thickness], directions: [.., normal] } = axes(&scatter);
+        if thickness > FLAT * FLAT * width {
+            return Ok(());
+        }
+        let beside = BESIDE * sqrt_f64(width);
+        let sights = self.problem.sights.iter();
+        let off_plane = sights.filter(|sight| dot(minus(sight.point, middle), normal).abs() > beside).count();
+        if off_plane < WITNESSES { Ok(()) } else { Err(NoPose::OnePlane { inliers: settled.inside, off_plane }) }
     }
 
     /// Deviation of the image of the agreeing points along its thinner axis, px.

@@ -2,8 +2,8 @@
 //!
 //! A Kalman filter for a position that moves at random: between fixes its covariance grows by `speed^2 t^2` on the ground (a walker may go
 //! anywhere with up to that speed) and by a tenth of that deviation upwards. A fix that contradicts the position (chi-square, 99.9 %) is left
-//! out and said to be; but if several fixes that were left out agree with each other, they were right and the track was wrong: the track
-//! goes over to them.
+//! out and said to be; but if three more fixes that were left out agree with each other than fixes in between agreed with the track, the track was
+//! wrong and goes over to them.
 
 use super::agreement::inverse;
 use super::geodesy::{LocalFrame, Wgs84};
@@ -12,7 +12,7 @@ use crate::camera::space::{Matrix, Vector, apply, dot, minus, plus, product};
 
 /// 99.9 % of chi-square with three degrees of freedom.
 const GATE: f64 = 16.266_236_196_238_13;
-/// So many contradicting fixes that agree with each other outweigh the track.
+/// So many contradicting fixes that agree with each other, less those in between that agree with the track, outweigh it.
 const OUTVOTED: u32 = 3;
 /// Upward motion, as a share of that on the ground.
 const UPWARD: f64 = 0.1;
@@ -79,6 +79,8 @@ impl Track {
         let Some((merged, chi_square)) = merged(&state, &new) else { return Update::Unusable };
         if chi_square <= GATE {
             self.state = Some(merged);
+            // Every fix that agrees with the track speaks against the challenger.
+            self.challenger = self.challenger.filter(|one| one.fixes > 1).map(|one| State { fixes: one.fixes - 1, ..one });
             return Update::Taken { chi_square };
         }
         let challenger = self.challenger.map(|challenger| self.later(challenger, time_s));
