@@ -19,10 +19,8 @@
 //!
 //! Foundations: [`math`] (the only caller of `libm`), [`point`] (frames of reference), [`profile`], [`kernel`] (the inner
 //! loops, which a caller may compile for wider instructions), [`transform`], [`linear`] and [`geometry`] (hulls and
-//! orientation, exact). [`capacity`] sizes it all for a small device.
-//! loops, which a caller may compile for wider instructions), [`transform`] and [`linear`]. [`capacity`] sizes it all for
-//! a small device. [`mesh`] makes many corresponding points of few, [`family`] and [`camera`] are the geometry of
-//! views.
+//! orientation, exact). [`capacity`] sizes it all for a small device. [`mesh`] makes many corresponding points of few, [`family`] and [`camera`] are the geometry of
+//! views, [`fix`] takes a pose to a position on Earth.
 //!
 //! A frame against a table in memory or flash:
 //!
@@ -78,6 +76,7 @@ pub mod geometry;
 pub mod mesh;
 pub mod family;
 pub mod camera;
+pub mod fix;
 
 pub mod image;
 pub mod tone;

@@ -38,6 +38,21 @@ impl<const UNKNOWNS: usize> NormalEquations<UNKNOWNS> {
         }
     }
 
+    /// Puts another matrix under the same right side: of a symmetric one, the lower triangle.
+    pub fn set_left(&mut self, matrix: [[f64; UNKNOWNS]; UNKNOWNS]) {
+        self.lower = matrix;
+        for (number, row) in self.lower.iter_mut().enumerate() {
+            for above in row.iter_mut().skip(number + 1) {
+                *above = 0.0;
+            }
+        }
+    }
+
+    /// Puts another right side under the same equations: unit vectors give the columns of the inverse.
+    pub fn set_right(&mut self, right: [f64; UNKNOWNS]) {
+        self.right = right;
+    }
+
     /// The unknowns; `None` if the equations do not determine them, or hold a NaN. The solution takes the equations'
     /// place, so that nothing is copied: they are of no use afterwards.
     pub fn solve(&mut self) -> Option<&[f64; UNKNOWNS]> {

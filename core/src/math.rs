@@ -32,6 +32,18 @@ pub fn floor(x: f64) -> f64 {
     libm::floor(x)
 }
 
+/// `(sin x, cos x)` of radians, within 1 ulp each; 0 and 1 for what is not finite, so that no NaN enters a result.
+#[inline]
+pub fn sin_cos(x: f64) -> (f64, f64) {
+    if x.is_finite() { (libm::sin(x), libm::cos(x)) } else { (0.0, 1.0) }
+}
+
+/// `atan2(y, x)` in radians, within 1 ulp; 0 for two zeros.
+#[inline]
+pub fn atan2(y: f64, x: f64) -> f64 {
+    if y == 0.0 && x == 0.0 { 0.0 } else { libm::atan2(y, x) }
+}
+
 /// `log2(n)` in 1/256 bit, rounded down; 0 for `n = 0`.
 ///
 /// Integer arithmetic only: the mantissa is squared eight times, each overflow beyond 2 giving one bit

@@ -8,6 +8,7 @@ pub mod data_uri;
 pub mod evaluation;
 pub mod explain;
 pub mod finding;
+pub mod map;
 pub mod overlay;
 pub mod page;
 pub mod phrase;

@@ -19,6 +19,7 @@ mod recognize;
 #[cfg_attr(target_os = "none", path = "start_bare.rs")]
 #[cfg_attr(not(target_os = "none"), path = "start_host.rs")]
 mod start;
+mod position;
 mod views;
 
 use daymark_core::capacity::{HANDHELD_FRONT_END, HandheldExtractor, HandheldFeatures, HandheldMemory};
@@ -55,7 +56,7 @@ static MEMORY_TABLE: [u32; 6] = [
 #[inline(never)]
 fn run(device: &mut Device) -> Result<Outcome, Failure> {
     let mut features = HandheldFeatures::new();
-    if !views::check(device) {
+    if !views::check(device) || !position::check(device) {
         return Err(Failure::Views);
     }
     see(device, &mut features)?;

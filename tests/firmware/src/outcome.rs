@@ -40,7 +40,7 @@ pub enum Failure {
     Blank,
     /// The flash pages are full.
     Full,
-    /// The geometry of views is wrong.
+    /// The geometry of views, or a position, is wrong.
     Views,
 }
 
