@@ -68,6 +68,7 @@ pub mod kernel;
 mod model;
 pub mod linear;
 pub mod transform;
+pub mod camera;
 
 pub mod image;
 pub mod tone;
