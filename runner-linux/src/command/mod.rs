@@ -8,6 +8,7 @@ pub mod demo;
 pub mod enroll;
 pub mod evaluate;
 pub mod recognize;
+pub mod study;
 pub mod table;
 
 use std::error::Error;
@@ -37,6 +38,8 @@ enum Command {
     Table(table::Args),
     /// Measure recall, false answers and time on a folder of pictures with a manifest
     Evaluate(evaluate::Args),
+    /// Repeat the experiments on which the figures in the documents rest
+    Study(study::Args),
     /// Time the stages of recognition on this machine
     Bench(bench::Args),
 }
@@ -74,6 +77,7 @@ impl Cli {
             Command::Recognize(args) => recognize::run(&args),
             Command::Table(args) => table::run(&args),
             Command::Evaluate(args) => evaluate::run(&args),
+            Command::Study(args) => study::run(&args),
             Command::Bench(args) => bench::run(&args),
         }
     }
