@@ -17,7 +17,8 @@
 //!
 //! Foundations: [`math`] (the only caller of `libm`), [`point`] (frames of reference), [`profile`], [`kernel`] (the inner
 //! loops, which a caller may compile for wider instructions), [`transform`] and [`linear`]. [`capacity`] sizes it all for
-//! a small device.
+//! a small device. [`mesh`] makes many corresponding points of few, [`family`] and [`camera`] are the geometry of
+//! views.
 //!
 //! A frame against a table in memory or flash:
 //!
@@ -68,6 +69,8 @@ pub mod kernel;
 mod model;
 pub mod linear;
 pub mod transform;
+pub mod mesh;
+pub mod family;
 pub mod camera;
 
 pub mod image;

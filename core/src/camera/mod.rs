@@ -1,3 +1,9 @@
-//! Cameras as maps, and what two or more of them say about a point of the model.
+//! How a camera sees points of space, and what two or more cameras say about a point.
+//!
+//! **Camera frame.** The origin is the centre of projection, x points right, y down as in the image, z along the optical axis
+//! into the scene. Lengths in metres, image coordinates in pixels from the principal point.
+//!
+//! Triangulation takes whole cameras instead: image coordinates as in [`crate::point`], points in the model frame.
 
+pub mod weak_perspective;
 pub mod triangulate;

@@ -18,6 +18,7 @@ mod recognize;
 #[cfg_attr(target_os = "none", path = "start_bare.rs")]
 #[cfg_attr(not(target_os = "none"), path = "start_host.rs")]
 mod start;
+mod views;
 
 use daymark_core::capacity::{HANDHELD_FRONT_END, HandheldExtractor, HandheldFeatures, HandheldMemory};
 use daymark_core::image::GrayView;
@@ -49,10 +50,13 @@ static MEMORY_TABLE: [u32; 6] = [
     MEMORY.recognizer as u32,
 ];
 
-/// One round: see, enroll, recognize.
+/// One round: the geometry of views, then see, enroll, recognize.
 #[inline(never)]
 fn run(device: &mut Device) -> Result<Outcome, Failure> {
     let mut features = HandheldFeatures::new();
+    if !views::check(device) {
+        return Err(Failure::Views);
+    }
     see(device, &mut features)?;
     enroll::enroll(features.view(), device.table())?;
     #[cfg(feature = "control")]

@@ -35,6 +35,8 @@ pub enum Failure {
     Blank,
     /// The flash pages are full.
     Full,
+    /// The geometry of views is wrong.
+    Views,
 }
 
 impl From<FrameError> for Failure {
