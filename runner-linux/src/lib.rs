@@ -14,6 +14,7 @@ pub mod engine;
 pub mod camera_file;
 pub mod synthesize;
 pub mod classify;
+pub mod model_file;
 pub mod enroll;
 pub mod table_file;
 pub mod dataset;

@@ -1,18 +1,20 @@
 //! Brings a test cloud into the frame of a base cloud.
 
 use nalgebra::Vector3;
+use serde::Serialize;
 
 use super::cloud::{Cloud, Similarity, vector};
 
 /// How clouds come together.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, clap::ValueEnum)]
+#[serde(rename_all = "snake_case")]
 pub enum Align {
-    /// Both clouds are in one frame already: known cameras with a common origin.
-    Frame,
-    /// Scale and axes agree (metric cameras, north and up known), the origin does not: the best shift is searched, from
-    /// clouds centred on one another.
+    /// Both clouds are in one frame whose origin is the building's centre, as known cameras put them there: nothing is to
+    /// be done. (The thesis, 7.1: "reconstructed and centered in the same coordinate".)
     #[default]
     Centered,
+    /// Scale and axes agree (metric cameras, north and up known), the origin does not: the best shift is searched.
+    Shift,
     /// Nothing agrees: a similarity, refined by iterated closest points.
     Similarity,
 }
@@ -36,8 +38,8 @@ const KEPT: f64 = 0.8;
 /// centroids, sizes and axes.
 pub fn base_from_test(test: &Cloud, base: &Cloud, align: Align, start: Option<Similarity>) -> Similarity {
     match align {
-        Align::Frame => Similarity::shift(Vector3::zeros()),
-        Align::Centered => centred(test, base),
+        Align::Centered => Similarity::shift(Vector3::zeros()),
+        Align::Shift => best_shift(test, base),
         Align::Similarity => {
             let start = start.unwrap_or_else(|| sized(test, base));
             closest_points(&test.sample(SAMPLE), base, start, ROUNDS, &|from, to| Similarity::fit(from, to, false)).0
@@ -47,7 +49,7 @@ pub fn base_from_test(test: &Cloud, base: &Cloud, align: Align, start: Option<Si
 
 /// Starts with centroids together and a quarter of the base to each side, horizontally and up and down: a test that shows
 /// the front only has its centroid before the base's. The best of all starts on thinned clouds are refined on the whole.
-fn centred(test: &Cloud, base: &Cloud) -> Similarity {
+fn best_shift(test: &Cloud, base: &Cloud) -> Similarity {
     let middle = base.centroid() - test.centroid();
     let [low, high] = base.extent();
     let quarter = (high - low) / 4.0;
@@ -157,7 +159,7 @@ mod tests {
         let part: Vec<[f32; 3]> =
             base.iter().filter(|p| p[0] < 4.0).map(|p| [p[0] + 9.0, p[1] - 3.0, p[2] + 1.0]).collect();
         let (base, test) = (Cloud::new(base, Vec::new(), 0.0), Cloud::new(part, Vec::new(), 0.0));
-        let map = base_from_test(&test, &base, Align::Centered, None);
+        let map = base_from_test(&test, &base, Align::Shift, None);
         assert!((map.translation - Vector3::new(-9.0, 3.0, -1.0)).norm() < 0.05, "{map:?}");
     }
 

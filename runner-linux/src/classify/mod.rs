@@ -9,4 +9,5 @@ pub mod cloud;
 pub mod align;
 pub mod error;
 pub mod decide;
+pub mod experiment;
 pub mod towers;

@@ -9,6 +9,7 @@ pub mod enroll;
 pub mod evaluate;
 pub mod recognize;
 pub mod study;
+pub mod synthesize;
 pub mod table;
 
 use std::error::Error;
@@ -34,6 +35,8 @@ enum Command {
     Enroll(enroll::Args),
     /// Say which building of a table each picture shows, and how sure that is
     Recognize(recognize::Args),
+    /// Make a textured 3D model of a building from two or more pictures
+    Synthesize(synthesize::Args),
     /// Look into, check, merge and change landmark tables
     Table(table::Args),
     /// Measure recall, false answers and time on a folder of pictures with a manifest
@@ -75,6 +78,7 @@ impl Cli {
             Command::Demo(args) => demo::run(&args),
             Command::Enroll(args) => enroll::run(&args),
             Command::Recognize(args) => recognize::run(&args),
+            Command::Synthesize(args) => synthesize::run(&args),
             Command::Table(args) => table::run(&args),
             Command::Evaluate(args) => evaluate::run(&args),
             Command::Study(args) => study::run(&args),

@@ -17,6 +17,15 @@
 //! ```
 
 pub mod view;
+pub mod features;
+pub mod epipolar;
+pub mod correspond;
+pub mod bundle;
+pub mod motion;
+pub mod corner_file;
+pub mod reconstruct;
+pub mod frame;
+pub mod report;
 pub mod triangulate;
 pub mod mesh;
 pub mod render;
