@@ -240,8 +240,7 @@ fn parallax_sine(sightings: &[Sighting<'_>], point: [f64; 3]) -> f64 {
         for other in sightings.iter().skip(index + 1) {
             let b = minus(point, other.camera.centre);
             let across = cross(a, b);
-            let sine =
-                if dot(a, b) < 0.0 { 1.0 } else { sqrt_f64(dot(across, across) / (dot(a, a) * dot(b, b))) };
+            let sine = if dot(a, b) < 0.0 { 1.0 } else { sqrt_f64(dot(across, across) / (dot(a, a) * dot(b, b))) };
             if sine > largest {
                 largest = sine;
             }
@@ -325,7 +324,8 @@ fn inverse(matrix: &Matrix3) -> Option<Matrix3> {
     if !(determinant.abs() > 0.0) {
         return None;
     }
-    let rows = [[x[0], y[0], z[0]], [x[1], y[1], z[1]], [x[2], y[2], z[2]]].map(|row| row.map(|entry| entry / determinant));
+    let rows =
+        [[x[0], y[0], z[0]], [x[1], y[1], z[1]], [x[2], y[2], z[2]]].map(|row| row.map(|entry| entry / determinant));
     rows.iter().flatten().all(|entry| entry.is_finite()).then_some(rows)
 }
 
@@ -425,7 +425,8 @@ mod tests {
         assert_eq!(triangulate(&[sighting], 1.0), Err(NoPoint::TooFewViews));
         assert_eq!(triangulate(&[sighting, sighting], 1.0), Err(NoPoint::Parallel));
         let other = self::camera(4.0, 0.0);
-        let crossed = [Sighting { camera: &camera, at: [200.0, 200.0] }, Sighting { camera: &other, at: [400.0, 200.0] }];
+        let crossed =
+            [Sighting { camera: &camera, at: [200.0, 200.0] }, Sighting { camera: &other, at: [400.0, 200.0] }];
         assert_eq!(triangulate(&crossed, 1.0), Err(NoPoint::Behind));
         assert_eq!(Pinhole::new([[1.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 0.0, 1.0]], [0.0; 3]), None);
     }

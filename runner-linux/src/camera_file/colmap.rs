@@ -22,7 +22,10 @@ pub fn folder(path: &Path) -> Result<Vec<FileCamera>, CameraFileError> {
     } else if file("cameras.txt").is_file() && file("images.txt").is_file() {
         (file("cameras.txt"), file("images.txt"), false)
     } else {
-        return Err(CameraFileError::new(path, "the folder has neither cameras.bin and images.bin nor cameras.txt and images.txt"));
+        return Err(CameraFileError::new(
+            path,
+            "the folder has neither cameras.bin and images.bin nor cameras.txt and images.txt",
+        ));
     };
     let (camera_bytes, image_bytes) = (read(&cameras)?, read(&images)?);
     let lenses = if binary { binary_cameras(&camera_bytes) } else { text_cameras(&camera_bytes) };
@@ -33,7 +36,10 @@ pub fn folder(path: &Path) -> Result<Vec<FileCamera>, CameraFileError> {
         .into_iter()
         .map(|shot| {
             let lens = lenses.get(&shot.camera).ok_or_else(|| {
-                CameraFileError::new(&images, format!("the picture {} has camera {}, which {} lacks", shot.name, shot.camera, cameras.display()))
+                CameraFileError::new(
+                    &images,
+                    format!("the picture {} has camera {}, which {} lacks", shot.name, shot.camera, cameras.display()),
+                )
             })?;
             Ok(FileCamera { picture: Some(shot.name), pose: Some(shot.pose), ..lens.clone() })
         })
@@ -82,7 +88,8 @@ fn lens(model: &str, size: [u32; 2], p: &[f64]) -> Result<FileCamera, String> {
     }
     // Models with one focal length have it first, then the principal point.
     let single = !matches!(model, "PINHOLE" | "OPENCV" | "OPENCV_FISHEYE" | "FULL_OPENCV" | "FOV");
-    let (focal, centre, rest) = if single { ([p[0], p[0]], [p[1], p[2]], &p[3..]) } else { ([p[0], p[1]], [p[2], p[3]], &p[4..]) };
+    let (focal, centre, rest) =
+        if single { ([p[0], p[0]], [p[1], p[2]], &p[3..]) } else { ([p[0], p[1]], [p[2], p[3]], &p[4..]) };
     if !(focal[0] > 0.0 && focal[1] > 0.0) || size.contains(&0) {
         return Err(format!("a camera {model} has a focal length or size that is not positive"));
     }
@@ -90,9 +97,7 @@ fn lens(model: &str, size: [u32; 2], p: &[f64]) -> Result<FileCamera, String> {
     let distortion = match model {
         "SIMPLE_RADIAL" | "RADIAL" => Distortion::radial(k(0), k(1)),
         "OPENCV" => Distortion::Radial { radial: [k(0), k(1), 0.0, 0.0, 0.0, 0.0], tangential: [k(2), k(3)] },
-        "FULL_OPENCV" => {
-            Distortion::Radial { radial: [k(0), k(1), k(4), k(5), k(6), k(7)], tangential: [k(2), k(3)] }
-        }
+        "FULL_OPENCV" => Distortion::Radial { radial: [k(0), k(1), k(4), k(5), k(6), k(7)], tangential: [k(2), k(3)] },
         "OPENCV_FISHEYE" => Distortion::Fisheye([k(0), k(1), k(2), k(3)]),
         "SIMPLE_RADIAL_FISHEYE" | "RADIAL_FISHEYE" => Distortion::Fisheye([k(0), k(1), 0.0, 0.0]),
         "FOV" => Distortion::FieldOfView(k(0)),
@@ -150,7 +155,7 @@ fn text_images(bytes: &[u8]) -> Result<Vec<Shot>, String> {
 /// Little-endian values, one after the other.
 struct Bytes<'b>(&'b [u8]);
 
-impl<'b> Bytes<'b> {
+impl Bytes<'_> {
     fn take<const N: usize>(&mut self) -> Result<[u8; N], String> {
         let (first, rest) = self.0.split_first_chunk::<N>().ok_or("it ends too early")?;
         self.0 = rest;
@@ -223,7 +228,8 @@ fn binary_images(bytes: &[u8]) -> Result<Vec<Shot>, String> {
 mod tests {
     use super::*;
 
-    const CAMERAS: &[u8] = b"# comment\n1 SIMPLE_RADIAL 1296 1936 2435.38 648 968 -0.0336\n2 PINHOLE 640 480 500 501 320 240\n";
+    const CAMERAS: &[u8] =
+        b"# comment\n1 SIMPLE_RADIAL 1296 1936 2435.38 648 968 -0.0336\n2 PINHOLE 640 480 500 501 320 240\n";
     const IMAGES: &[u8] = b"# two lines each\n1 1 0 0 0 1 2 3 1 a b.JPG\n10 20 -1 30 40 7\n2 0.7071067811865476 0 0 0.7071067811865476 0 0 5 2 c.png\n\n";
 
     fn packed() -> (Vec<u8>, Vec<u8>) {

@@ -26,6 +26,8 @@ pub enum Distortion {
 
 /// Newton steps to undo a distortion, at most.
 const STEPS: usize = 50;
+/// Half the distance over which derivatives are taken.
+const H: f64 = 1e-6;
 
 impl Distortion {
     /// Two radial coefficients.
@@ -92,11 +94,10 @@ impl Distortion {
             // The angle is known at once; Newton mends the rest.
             Self::Fisheye(_) | Self::FieldOfView(_) => {
                 let r = libm::sqrt(seen[0] * seen[0] + seen[1] * seen[1]);
-                if r < 1e-12 || r > 1.5 { seen } else { seen.map(|s| s * libm::tan(r) / r) }
+                if (1e-12..1.5).contains(&r) { seen.map(|s| s * libm::tan(r) / r) } else { seen }
             }
             _ => seen,
         };
-        const H: f64 = 1e-6;
         for _ in 0..STEPS {
             let now = self.apply(at);
             let (ex, ey) = (seen[0] - now[0], seen[1] - now[1]);

@@ -43,6 +43,7 @@ impl Lens {
     }
 
     /// The same lens for the same picture scaled to another size; pixel areas align.
+    #[must_use]
     pub fn scaled_to(&self, width: u32, height: u32) -> Self {
         let scale = [f64::from(width) / f64::from(self.width), f64::from(height) / f64::from(self.height)];
         let centre = |axis: usize| (self.centre[axis] + 0.5) * scale[axis] - 0.5;
@@ -143,11 +144,7 @@ mod tests {
 
     #[test]
     fn distortion_is_undone() {
-        let lens = Lens {
-            distortion: Distortion::radial(-0.2, 0.05),
-            skew: 0.7,
-            ..Lens::of_focal(640, 480, 560.0)
-        };
+        let lens = Lens { distortion: Distortion::radial(-0.2, 0.05), skew: 0.7, ..Lens::of_focal(640, 480, 560.0) };
         for pixel in [[0.0, 0.0], [639.0, 3.0], [320.0, 240.0], [100.0, 420.0]] {
             let back = lens.picture_from_ideal(lens.ideal_from_picture(pixel).unwrap());
             assert!((back[0] - pixel[0]).abs() < 1e-9 && (back[1] - pixel[1]).abs() < 1e-9, "{pixel:?} {back:?}");

@@ -116,8 +116,9 @@ pub fn cameras(path: &Path) -> Result<Vec<FileCamera>, CameraFileError> {
         return colmap::folder(path);
     }
     let bytes = read(path)?;
-    let text = String::from_utf8(bytes)
-        .map_err(|_| CameraFileError::new(path, "it is not text; for a COLMAP model give the folder with cameras.bin"))?;
+    let text = String::from_utf8(bytes).map_err(|_| {
+        CameraFileError::new(path, "it is not text; for a COLMAP model give the folder with cameras.bin")
+    })?;
     let ending = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
     let result = match ending.as_str() {
         "camera" => strecha::parse(&text),

@@ -15,9 +15,10 @@ const COEFFICIENTS: [&str; 5] =
 /// # Errors
 /// What is wrong with it.
 pub fn parse(text: &str) -> Result<FileCamera, String> {
-    let matrix = MATRIX.iter().find_map(|key| list(text, key)).ok_or_else(|| {
-        format!("it has no camera matrix ({})", MATRIX.join(", "))
-    })??;
+    let matrix = MATRIX
+        .iter()
+        .find_map(|key| list(text, key))
+        .ok_or_else(|| format!("it has no camera matrix ({})", MATRIX.join(", ")))??;
     let found = matrix.len();
     let Ok::<[f64; 9], _>([fx, skew, cx, _, fy, cy, _, _, last]) = matrix.try_into() else {
         return Err(format!("its camera matrix has {found} numbers instead of 9"));
@@ -111,8 +112,7 @@ mod tests {
     fn both_dialects() {
         let camera = parse(OPENCV).unwrap();
         assert_eq!((camera.size, camera.focal), (Some([640, 480]), [657.4, 658.1]));
-        let expected =
-            Distortion::Radial { radial: [-0.28, 0.07, 0.01, 0.0, 0.0, 0.0], tangential: [1e-3, -2e-3] };
+        let expected = Distortion::Radial { radial: [-0.28, 0.07, 0.01, 0.0, 0.0, 0.0], tangential: [1e-3, -2e-3] };
         assert_eq!(camera.distortion, expected);
         let camera = parse(ROS).unwrap();
         assert_eq!(camera.distortion, Distortion::Fisheye([0.01, 0.02, 0.03, 0.04]));

@@ -69,7 +69,8 @@ fn best_shift(test: &Cloud, base: &Cloud) -> Similarity {
     found.sort_by(|a, b| a.1.total_cmp(&b.1));
     let mut refined: Vec<(Similarity, f64)> = Vec::new();
     for (start, _) in found {
-        let apart = |other: &(Similarity, f64)| (other.0.translation - start.translation).norm() > 0.02 * (high - low).norm();
+        let apart =
+            |other: &(Similarity, f64)| (other.0.translation - start.translation).norm() > 0.02 * (high - low).norm();
         if refined.len() < REFINED && refined.iter().all(apart) {
             refined.push(closest_points(&test.sample(SAMPLE), base, start, ROUNDS, &shifted));
         }

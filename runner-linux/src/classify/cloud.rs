@@ -49,9 +49,9 @@ impl Cloud {
     /// Lowest and highest coordinates.
     pub fn extent(&self) -> [Vector3<f64>; 2] {
         let infinite = Vector3::repeat(f64::INFINITY);
-        self.positions.iter().fold([infinite, -infinite], |[low, high], &point| {
-            [low.inf(&vector(point)), high.sup(&vector(point))]
-        })
+        self.positions
+            .iter()
+            .fold([infinite, -infinite], |[low, high], &point| [low.inf(&vector(point)), high.sup(&vector(point))])
     }
 
     /// At most `count` points, evenly taken from the order.

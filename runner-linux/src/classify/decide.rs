@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::error::Comparison;
 
 /// Which intensity error decides.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, clap::ValueEnum)]
 pub enum Intensity {
     /// Free of gain and bias.
     #[default]
@@ -91,7 +91,8 @@ pub fn decide(comparisons: &[&Comparison], size: f64, rule: &Rule, intensity: In
         let (margin, shape_share, intensity) = (f64::INFINITY, f64::INFINITY, 1.0);
         return Decision { answer, nearest: None, ambiguous: Vec::new(), margin, shape_share, intensity };
     };
-    let ambiguous: Vec<usize> = bases.clone().filter(|&base| shape(base) <= shape(first) * rule.ambiguity_ratio).collect();
+    let ambiguous: Vec<usize> =
+        bases.clone().filter(|&base| shape(base) <= shape(first) * rule.ambiguity_ratio).collect();
     let nearest = ambiguous.iter().copied().min_by(|&a, &b| look(a).total_cmp(&look(b))).unwrap_or(first);
     let outside = bases.filter(|base| !ambiguous.contains(base)).map(|base| shape(base) / shape(nearest));
     let inside = ambiguous.iter().filter(|&&base| base != nearest).map(|&base| look(base) / look(nearest));

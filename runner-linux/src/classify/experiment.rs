@@ -37,10 +37,7 @@ pub fn size(cloud: &Cloud) -> f64 {
 /// A test compared with every base.
 pub fn compare_with_each(test: &Cloud, bases: &[Cloud], method: &Method) -> Vec<Comparison> {
     let reach = method.reach_share * size(test);
-    bases
-        .par_iter()
-        .map(|base| compare(test, base, base_from_test(test, base, method.align, None), reach))
-        .collect()
+    bases.par_iter().map(|base| compare(test, base, base_from_test(test, base, method.align, None), reach)).collect()
 }
 
 /// One test in numbers: a row of the thesis' Table 1 with its decision.
@@ -77,7 +74,11 @@ impl Row {
 
 /// The decision with one base left out.
 pub fn without(base: usize, size: f64, comparisons: &[Comparison], method: &Method) -> Answer {
-    let rest: Vec<&Comparison> =
-        comparisons.iter().enumerate().filter(|(number, _)| *number != base).map(|(_, comparison)| comparison).collect();
+    let rest: Vec<&Comparison> = comparisons
+        .iter()
+        .enumerate()
+        .filter(|(number, _)| *number != base)
+        .map(|(_, comparison)| comparison)
+        .collect();
     decide(&rest, size, &method.rule, method.intensity).answer
 }

@@ -9,5 +9,6 @@ pub mod cloud;
 pub mod align;
 pub mod error;
 pub mod decide;
+pub mod histogram;
 pub mod experiment;
 pub mod towers;

@@ -73,8 +73,8 @@ impl NearestPoints {
             let first = self.leaves.len() - 1;
             let leaf = &mut self.leaves[node - first];
             for (slot, (point, number)) in entries.iter().enumerate() {
-                for axis in 0..3 {
-                    leaf.coordinates[axis][slot] = point[axis];
+                for (line, &c) in leaf.coordinates.iter_mut().zip(point) {
+                    line[slot] = c;
                 }
                 leaf.numbers[slot] = *number;
             }

@@ -5,7 +5,7 @@ use std::error::Error;
 
 use daymark_core::mesh::SubdivisionLevel;
 use daymark_fixtures::random::SplitMix64;
-use daymark_fixtures::{Camera, Light, Lens as FixtureLens, Scene, Sensor, Site, Tower, render, view};
+use daymark_fixtures::{Camera, Lens as FixtureLens, Light, Scene, Sensor, Site, Tower, render, view};
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
@@ -60,13 +60,15 @@ impl TowerViews {
                 let [right, down, forward] = camera.view_from_world.map(|axis| [axis.x, axis.y, axis.z]);
                 let at = camera.position;
                 let pose = Pose {
-                    view_from_model: Matrix3::from_rows(&[right, down, forward].map(|row| Vector3::from(row).transpose())),
+                    view_from_model: Matrix3::from_rows(
+                        &[right, down, forward].map(|row| Vector3::from(row).transpose()),
+                    ),
                     position: Vector3::new(at.x, at.y, at.z),
                 };
                 let corners: Vec<_> = corners.collect();
-                let gray =
-                    GrayImage { pixels: frame.gray, width: frame.width as usize, height: frame.height as usize };
-                let view = View { name: format!("tower {} at {angle} degrees", tower.number), gray, rgb: frame.rgb, lens };
+                let gray = GrayImage { pixels: frame.gray, width: frame.width as usize, height: frame.height as usize };
+                let view =
+                    View { name: format!("tower {} at {angle} degrees", tower.number), gray, rgb: frame.rgb, lens };
                 (view, Station::new(&lens, pose), corners)
             })
             .collect();
@@ -95,7 +97,7 @@ impl TowerViews {
         let mut noise = Gauss::new(seed ^ 0x6A09_E667_F3BC_C908);
         for view in &mut self.views {
             for level in &mut view.gray.pixels {
-                *level = (f64::from(*level) + deviation * noise.next() + 0.5).clamp(0.0, 255.0) as u8;
+                *level = (f64::from(*level) + deviation * noise.draw() + 0.5).clamp(0.0, 255.0) as u8;
             }
         }
         self
@@ -107,7 +109,7 @@ impl TowerViews {
         let mut tracks = std::collections::BTreeMap::new();
         for (view, corners) in self.corners.iter().enumerate() {
             for &(number, [x, y]) in corners {
-                let at = [x + deviation_px * noise.next(), y + deviation_px * noise.next()];
+                let at = [x + deviation_px * noise.draw(), y + deviation_px * noise.draw()];
                 let track = tracks.entry(number).or_insert_with(|| Track { number, sightings: Vec::new() });
                 track.sightings.push((view, at));
             }
@@ -125,7 +127,7 @@ impl TowerViews {
             max_reprojection_px: (5.0 * deviation_px).max(0.5),
             ..Rules::default()
         };
-        Model::new(&self.views, &self.stations, &self.tracks(deviation_px, seed), &pairs, &rules)
+        Model::new(&self.views, &self.stations, &self.tracks(deviation_px, seed), &pairs, &rules, 0.0)
     }
 
     /// The dense cloud of that model.
@@ -154,7 +156,7 @@ impl Gauss {
     }
 
     /// The next number: mean 0, variance 1, within 6.
-    pub fn next(&mut self) -> f64 {
+    pub fn draw(&mut self) -> f64 {
         // Four words give twelve numbers of 21 bits.
         let mut sum = 0;
         for _ in 0..4 {
@@ -172,7 +174,7 @@ mod tests {
     #[test]
     fn noise_is_normal() {
         let mut noise = Gauss::new(3);
-        let numbers: Vec<f64> = (0..20_000).map(|_| noise.next()).collect();
+        let numbers: Vec<f64> = (0..20_000).map(|_| noise.draw()).collect();
         let mean = numbers.iter().sum::<f64>() / 20_000.0;
         let variance = numbers.iter().map(|x| x * x).sum::<f64>() / 20_000.0;
         assert!(mean.abs() < 0.03 && (variance - 1.0).abs() < 0.04, "{mean} {variance}");

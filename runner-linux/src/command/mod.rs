@@ -4,6 +4,7 @@
 //! answer, 2 error.
 
 pub mod bench;
+pub mod classify;
 pub mod demo;
 pub mod enroll;
 pub mod evaluate;
@@ -37,6 +38,8 @@ enum Command {
     Recognize(recognize::Args),
     /// Make a textured 3D model of a building from two or more pictures
     Synthesize(synthesize::Args),
+    /// Say which of several models a model is, by shape and appearance
+    Classify(classify::Args),
     /// Look into, check, merge and change landmark tables
     Table(table::Args),
     /// Measure recall, false answers and time on a folder of pictures with a manifest
@@ -79,6 +82,7 @@ impl Cli {
             Command::Enroll(args) => enroll::run(&args),
             Command::Recognize(args) => recognize::run(&args),
             Command::Synthesize(args) => synthesize::run(&args),
+            Command::Classify(args) => classify::run(&args),
             Command::Table(args) => table::run(&args),
             Command::Evaluate(args) => evaluate::run(&args),
             Command::Study(args) => study::run(&args),

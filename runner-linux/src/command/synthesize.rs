@@ -13,17 +13,19 @@ use super::{CommandError, Outcome};
 use crate::model_file::Format;
 use crate::picture::{read_colour, scaled_colours};
 use crate::synthesize::frame::{Scale, moved, upright};
-use crate::synthesize::reconstruct::{Cameras, Corners, NoModel, reconstruct};
+use crate::synthesize::reconstruct::{Cameras, Corners, NoModel, Shape, reconstruct};
 use crate::synthesize::report::facts;
 use crate::synthesize::triangulate::Rules;
 use crate::synthesize::view::View;
 
 /// Arguments of `daymark synthesize`.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Exit codes: 0 the model is written, 1 the pictures give no model (the reason has a figure), 2 an error. \
+#[command(
+    after_help = "Exit codes: 0 the model is written, 1 the pictures give no model (the reason has a figure), 2 an error. \
                         No file is written unless all is done.\n\n\
                         Memory: pictures take 4 bytes a pixel of the size used, the dense model 47 bytes a point; 47 corners \
-                        have 672,385 points at level 7 (32 MB), and more than 24,000,000 points (1.2 GB) are refused.")]
+                        have 672,385 points at level 7 (32 MB), and more than 24,000,000 points (1.2 GB) are refused."
+)]
 pub struct Args {
     /// Pictures of one building, from two or more places
     #[arg(required = true, value_name = "IMAGES")]
@@ -35,7 +37,8 @@ pub struct Args {
     /// in their order (.camera, YAML, or a 3 x 4 projection matrix as text)
     #[arg(long, value_name = "PATHS", num_args = 1..)]
     cameras: Vec<PathBuf>,
-    /// Focal length in pixels of the pictures as they are, if EXIF does not say it
+    /// Focal length in pixels of the pictures as they are, if EXIF does not say it. Without any, cameras are taken as affine:
+    /// coarser, without scale, and from two pictures without angles
     #[arg(long, value_name = "PIXELS", conflicts_with = "cameras")]
     focal_px: Option<f64>,
     /// The lens is exactly as given: do not adjust focal length and distortion to the pictures
@@ -90,14 +93,19 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     }
     for (what, count) in [("--corners", args.corners.len())] {
         if count > 0 && count != args.images.len() {
-            return Err(format!("{what} needs one file for each picture: {} pictures, {count} files", args.images.len()).into());
+            return Err(format!(
+                "{what} needs one file for each picture: {} pictures, {count} files",
+                args.images.len()
+            )
+            .into());
         }
     }
     let level = SubdivisionLevel::new(args.levels).ok_or("levels go from 0 to 7")?;
     let progress = Steps::new();
     progress.step("reading pictures");
     let (views, known, corners) = inputs(args)?;
-    let rules = Rules { min_parallax_degree: args.min_parallax, max_reprojection_px: args.max_error_px, ..Rules::default() };
+    let rules =
+        Rules { min_parallax_degree: args.min_parallax, max_reprojection_px: args.max_error_px, ..Rules::default() };
     progress.step("matching corners and placing cameras");
     let mut made = match reconstruct(views, &known, &corners, &rules) {
         Ok(made) => made,
@@ -196,12 +204,25 @@ fn place(args: &Args, made: &mut crate::synthesize::reconstruct::Reconstruction)
         (Some(metres), _) | (_, Some(metres)) if !(metres > 0.0 && metres < 1e6) => {
             return Err(format!("{metres} m is no distance or height of a building").into());
         }
+        (Some(_), _) if made.shape == Shape::UpToMirror => {
+            return Err("affine cameras have no distance between them: give --focal-px, or --height-m instead".into());
+        }
         (Some(metres), _) => Scale::Distance(metres),
         (_, Some(metres)) => Scale::Height(metres),
-        _ if made.metric => return Ok("camera_file_unit"),
+        _ if made.shape == Shape::Metric => return Ok("camera_file_unit"),
+        // An affine model has no lengths, and its frame no up.
+        _ if made.shape == Shape::Affine => return Ok("affine"),
+        _ if made.shape == Shape::UpToMirror => {
+            let map = upright(made, &Scale::Height(1.0)).ok_or("the cameras do not say where up is")?;
+            moved(made, &map);
+            return Ok("model_height");
+        }
         _ => Scale::Places(cameras::places(&args.images)),
     };
-    if made.metric {
+    if made.shape == Shape::Affine {
+        return Err("without a focal length two pictures have no scale: give --focal-px, or a third picture".into());
+    }
+    if made.shape == Shape::Metric {
         return Err("the cameras' file says how long everything is: leave out --distance-m and --height-m".into());
     }
     let (map, unit) = match upright(made, &asked) {
@@ -209,7 +230,9 @@ fn place(args: &Args, made: &mut crate::synthesize::reconstruct::Reconstruction)
         None if matches!(asked, Scale::Places(_)) => {
             (upright(made, &Scale::None).ok_or("the cameras do not say where up is")?, "first_baseline")
         }
-        None => return Err("the first two pictures are not both part of the model, so their distance gives no scale".into()),
+        None => {
+            return Err("the first two pictures are not both part of the model, so their distance gives no scale".into());
+        }
     };
     moved(made, &map);
     Ok(unit)

@@ -66,27 +66,28 @@ pub fn textured(cloud: &DenseCloud, sheets: &[Sheet], extras: &Value) -> Vec<u8>
     for sheet in sheets {
         let positions: Vec<[f32; 3]> = sheet.points.iter().map(|&p| y_up(cloud.positions[p as usize])).collect();
         let position = parts.positions(&positions);
-        let uv: Vec<u8> = sheet.uv.iter().flatten().flat_map(|c| c.to_le_bytes()).collect();
-        let uv = parts.accessor(&uv, ARRAY, FLOAT, sheet.uv.len(), "VEC2");
         let indices: Vec<u8> = sheet.triangles.iter().flatten().flat_map(|i| i.to_le_bytes()).collect();
         let indices = parts.accessor(&indices, ELEMENTS, UNSIGNED_INT, 3 * sheet.triangles.len(), "SCALAR");
         let mut surface = json!({ "metallicFactor": 0.0, "roughnessFactor": 1.0 });
+        let mut attributes = json!({ "POSITION": position });
         if sheet.jpeg.is_empty() {
             surface["baseColorFactor"] = json!([0.5, 0.5, 0.5, 1.0]);
         } else {
+            let uv: Vec<u8> = sheet.uv.iter().flatten().flat_map(|c| c.to_le_bytes()).collect();
+            attributes["TEXCOORD_0"] = parts.accessor(&uv, ARRAY, FLOAT, sheet.uv.len(), "VEC2").into();
             let view = parts.view(&sheet.jpeg, None);
             surface["baseColorTexture"] = json!({ "index": images.len() });
             images.push(json!({ "bufferView": view, "mimeType": "image/jpeg" }));
         }
         primitives.push(json!({
-            "attributes": { "POSITION": position, "TEXCOORD_0": uv },
+            "attributes": attributes,
             "indices": indices,
             "material": materials.len(),
         }));
         materials.push(json!({ "pbrMetallicRoughness": surface, "doubleSided": true, "extensions": { "KHR_materials_unlit": {} } }));
     }
     let textures: Vec<Value> = (0..images.len()).map(|image| json!({ "source": image, "sampler": 0 })).collect();
-    let mut document = document(parts.views, parts.accessors, primitives, materials, extras);
+    let mut document = document(&parts, &primitives, &materials, extras);
     if !images.is_empty() {
         document["images"] = images.into();
         document["textures"] = textures.into();
@@ -118,7 +119,7 @@ pub fn patches(cloud: &DenseCloud, extras: &Value) -> Vec<u8> {
         "extensions": { "KHR_materials_unlit": {} },
     });
     let primitive = json!({ "attributes": { "POSITION": position, "COLOR_0": colour }, "material": 0 });
-    file(document(parts.views, parts.accessors, vec![primitive], vec![material], extras), &parts.binary)
+    file(document(&parts, &[primitive], &[material], extras), &parts.binary)
 }
 
 /// An sRGB level as linear light, 0 to 65,535 (IEC 61966-2-1).
@@ -128,13 +129,7 @@ fn linear(level: u8) -> u16 {
     (light * 65_535.0 + 0.5) as u16
 }
 
-fn document(
-    views: Vec<Value>,
-    accessors: Vec<Value>,
-    primitives: Vec<Value>,
-    materials: Vec<Value>,
-    extras: &Value,
-) -> Value {
+fn document(parts: &Parts, primitives: &[Value], materials: &[Value], extras: &Value) -> Value {
     json!({
         "asset": { "version": "2.0", "generator": concat!("daymark ", env!("CARGO_PKG_VERSION")) },
         "scene": 0,
@@ -142,8 +137,8 @@ fn document(
         "nodes": [{ "mesh": 0, "name": "building", "extras": extras }],
         "meshes": [{ "primitives": primitives }],
         "materials": materials,
-        "accessors": accessors,
-        "bufferViews": views,
+        "accessors": parts.accessors,
+        "bufferViews": parts.views,
         "extensionsUsed": ["KHR_materials_unlit"],
     })
 }

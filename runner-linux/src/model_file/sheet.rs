@@ -47,7 +47,9 @@ pub fn sheets(cloud: &DenseCloud, shown: &[Option<u32>], views: &[View], station
         if sheet.triangles.is_empty() {
             continue;
         }
-        if let Some((view, Some(station))) = view.and_then(|view| Some((views.get(view)?, stations.get(view)?.as_ref()))) {
+        if let Some((view, Some(station))) =
+            view.and_then(|view| Some((views.get(view)?, stations.get(view)?.as_ref())))
+        {
             texture(&mut sheet, cloud, view, station);
         } else {
             sheet.uv = vec![[0.0; 2]; sheet.points.len()];

@@ -173,124 +173,34 @@ impl Bundle {
 
     /// The bundle after one damped step; `None` if the system cannot be solved.
     fn stepped(&self, free: Free, damping: f64) -> Option<Self> {
-        let cameras = self.poses.len();
-        let lens = 6 * cameras;
-        let size = lens + 2;
-        let mut matrix = DMatrix::<f64>::zeros(size, size);
-        let mut right = DVector::<f64>::zeros(size);
-        // What eliminating each point takes: V^-1, V^-1 times its right side, and its coupling to each camera and the lens.
-        let mut eliminated = Vec::with_capacity(self.points.len());
-        for (point, observations) in self.points.iter().zip(&self.observations) {
-            let mut v = Matrix3::<f64>::zeros();
-            let mut b = Vector3::<f64>::zeros();
-            let mut couplings: Vec<(usize, Matrix6x3<f64>)> = Vec::with_capacity(observations.len());
-            let mut lens_coupling = SMatrix::<f64, 2, 3>::zeros();
-            for observation in observations {
-                if matches!(free, Free::Camera(camera) if camera != observation.camera) {
-                    continue;
-                }
-                let Some(Linear { residual, camera, lens: by_lens, point: by_point }) = self.linear(point, observation)
-                else {
-                    continue;
-                };
-                let length = residual.norm();
-                let weight = if length <= HUBER_PX { 1.0 } else { HUBER_PX / length };
-                let at = 6 * observation.camera;
-                let mut block = matrix.fixed_view_mut::<6, 6>(at, at);
-                block += camera.transpose() * camera * weight;
-                let mut side = right.fixed_rows_mut::<6>(at);
-                side += camera.transpose() * residual * weight;
-                if free == Free::MotionAndLens {
-                    let mut block = matrix.fixed_view_mut::<2, 2>(lens, lens);
-                    block += by_lens.transpose() * by_lens * weight;
-                    let mut block = matrix.fixed_view_mut::<6, 2>(at, lens);
-                    block += camera.transpose() * by_lens * weight;
-                    let mut side = right.fixed_rows_mut::<2>(lens);
-                    side += by_lens.transpose() * residual * weight;
-                    lens_coupling += by_lens.transpose() * by_point * weight;
-                }
-                v += by_point.transpose() * by_point * weight;
-                b += by_point.transpose() * residual * weight;
-                couplings.push((observation.camera, camera.transpose() * by_point * weight));
-            }
-            if matches!(free, Free::Camera(_)) {
-                eliminated.push(None);
-                continue;
-            }
-            for axis in 0..3 {
-                v[(axis, axis)] += damping * v[(axis, axis)] + 1e-12;
-            }
-            let Some(inverse) = v.try_inverse() else {
-                eliminated.push(None);
-                continue;
-            };
-            for (number, (one, w)) in couplings.iter().enumerate() {
-                let folded = w * inverse;
-                let mut side = right.fixed_rows_mut::<6>(6 * one);
-                side -= folded * b;
-                for (other, u) in couplings.iter().skip(number) {
-                    let product = folded * u.transpose();
-                    // The upper triangle only; cameras of a point ascend.
-                    let mut block = matrix.fixed_view_mut::<6, 6>(6 * one, 6 * other);
-                    block -= product;
-                }
-                if free == Free::MotionAndLens {
-                    let mut block = matrix.fixed_view_mut::<6, 2>(6 * one, lens);
-                    block -= folded * lens_coupling.transpose();
-                }
-            }
-            if free == Free::MotionAndLens {
-                let folded = lens_coupling * inverse;
-                let mut block = matrix.fixed_view_mut::<2, 2>(lens, lens);
-                block -= folded * lens_coupling.transpose();
-                let mut side = right.fixed_rows_mut::<2>(lens);
-                side -= folded * b;
-            }
-            eliminated.push(Some((inverse, b, couplings, lens_coupling)));
-        }
-        for row in 0..size {
-            for column in row + 1..size {
-                matrix[(column, row)] = matrix[(row, column)];
-            }
-        }
-        let fixed = |unknown: usize| match free {
-            Free::Motion => unknown < 6 || unknown >= lens,
-            Free::MotionAndLens => unknown < 6,
-            Free::Camera(camera) => unknown / 6 != camera || unknown >= lens,
-        };
-        for unknown in 0..size {
-            if fixed(unknown) {
-                matrix.row_mut(unknown).fill(0.0);
-                matrix.column_mut(unknown).fill(0.0);
-                matrix[(unknown, unknown)] = 1.0;
-                right[unknown] = 0.0;
-            } else {
-                matrix[(unknown, unknown)] += damping * matrix[(unknown, unknown)].abs() + 1e-12;
-            }
-        }
-        let step = matrix.cholesky()?.solve(&right);
+        let mut system = Reduced::new(self.poses.len());
+        let eliminated: Vec<Option<Eliminated>> = self
+            .points
+            .iter()
+            .zip(&self.observations)
+            .map(|(point, observations)| system.add_point(self, point, observations, free, damping))
+            .collect();
+        let step = system.solve(free, damping)?;
         let mut next = self.clone();
         for (camera, pose) in next.poses.iter_mut().enumerate() {
-            let at = 6 * camera;
-            if fixed(at) {
-                continue;
+            let part = step.fixed_rows::<6>(6 * camera);
+            if part.norm_squared() > 0.0 {
+                let turn = Rotation3::from_scaled_axis(Vector3::new(part[0], part[1], part[2]));
+                pose.view_from_model = turn.matrix() * pose.view_from_model;
+                pose.position += Vector3::new(part[3], part[4], part[5]);
             }
-            let turn = Rotation3::from_scaled_axis(Vector3::new(step[at], step[at + 1], step[at + 2]));
-            pose.view_from_model = turn.matrix() * pose.view_from_model;
-            pose.position += Vector3::new(step[at + 3], step[at + 4], step[at + 5]);
         }
-        if free == Free::MotionAndLens {
-            next.common.log_focal += step[lens];
-            next.common.k1 += step[lens + 1];
-        }
+        let lens = step.fixed_rows::<2>(6 * self.poses.len());
+        next.common.log_focal += lens[0];
+        next.common.k1 += lens[1];
         for (point, eliminated) in next.points.iter_mut().zip(&eliminated) {
-            let Some((inverse, b, couplings, lens_coupling)) = eliminated else { continue };
-            let mut side = *b;
-            for (camera, w) in couplings {
+            let Some(eliminated) = eliminated else { continue };
+            let mut side = eliminated.side;
+            for (camera, w) in &eliminated.cameras {
                 side -= w.transpose() * step.fixed_rows::<6>(6 * camera);
             }
-            side -= lens_coupling.transpose() * step.fixed_rows::<2>(lens);
-            *point += inverse * side;
+            side -= eliminated.lens.transpose() * lens;
+            *point += eliminated.inverse * side;
         }
         next.poses.iter().all(|pose| pose.position.iter().all(|c| c.is_finite())).then_some(next)
     }
@@ -299,6 +209,122 @@ impl Bundle {
     pub fn distances(&self, point: usize) -> impl Iterator<Item = f64> + '_ {
         let position = &self.points[point];
         self.observations[point].iter().map(|o| self.residual(position, o).map_or(f64::INFINITY, |r| r.norm()))
+    }
+}
+
+/// What eliminating a point leaves behind, to find its step afterwards.
+struct Eliminated {
+    inverse: Matrix3<f64>,
+    side: Vector3<f64>,
+    cameras: Vec<(usize, Matrix6x3<f64>)>,
+    lens: SMatrix<f64, 2, 3>,
+}
+
+/// The system of the cameras and the lens, after the points are eliminated: the upper triangle.
+struct Reduced {
+    matrix: DMatrix<f64>,
+    right: DVector<f64>,
+    lens: usize,
+}
+
+impl Reduced {
+    fn new(cameras: usize) -> Self {
+        let lens = 6 * cameras;
+        Self { matrix: DMatrix::zeros(lens + 2, lens + 2), right: DVector::zeros(lens + 2), lens }
+    }
+
+    /// Adds a point's observations, and eliminates the point unless it stands still.
+    fn add_point(
+        &mut self,
+        bundle: &Bundle,
+        point: &Vector3<f64>,
+        observations: &[Observation],
+        free: Free,
+        damping: f64,
+    ) -> Option<Eliminated> {
+        let lens = self.lens;
+        let mut v = Matrix3::<f64>::zeros();
+        let mut side = Vector3::<f64>::zeros();
+        let mut cameras: Vec<(usize, Matrix6x3<f64>)> = Vec::with_capacity(observations.len());
+        let mut by_lens = SMatrix::<f64, 2, 3>::zeros();
+        for observation in observations {
+            if matches!(free, Free::Camera(camera) if camera != observation.camera) {
+                continue;
+            }
+            let Some(linear) = bundle.linear(point, observation) else { continue };
+            let length = linear.residual.norm();
+            let weight = if length <= HUBER_PX { 1.0 } else { HUBER_PX / length };
+            let at = 6 * observation.camera;
+            let weighted = linear.camera.transpose() * weight;
+            let mut block = self.matrix.fixed_view_mut::<6, 6>(at, at);
+            block += weighted * linear.camera;
+            let mut rows = self.right.fixed_rows_mut::<6>(at);
+            rows += weighted * linear.residual;
+            if free == Free::MotionAndLens {
+                let mut block = self.matrix.fixed_view_mut::<6, 2>(at, lens);
+                block += weighted * linear.lens;
+                let weighted = linear.lens.transpose() * weight;
+                let mut block = self.matrix.fixed_view_mut::<2, 2>(lens, lens);
+                block += weighted * linear.lens;
+                let mut rows = self.right.fixed_rows_mut::<2>(lens);
+                rows += weighted * linear.residual;
+                by_lens += weighted * linear.point;
+            }
+            v += linear.point.transpose() * linear.point * weight;
+            side += linear.point.transpose() * linear.residual * weight;
+            cameras.push((observation.camera, weighted * linear.point));
+        }
+        if matches!(free, Free::Camera(_)) {
+            return None;
+        }
+        for axis in 0..3 {
+            v[(axis, axis)] += damping * v[(axis, axis)] + 1e-12;
+        }
+        let inverse = v.try_inverse()?;
+        for (number, (one, w)) in cameras.iter().enumerate() {
+            let folded = w * inverse;
+            let mut rows = self.right.fixed_rows_mut::<6>(6 * one);
+            rows -= folded * side;
+            // Cameras of a point ascend.
+            for (other, u) in cameras.iter().skip(number) {
+                let mut block = self.matrix.fixed_view_mut::<6, 6>(6 * one, 6 * other);
+                block -= folded * u.transpose();
+            }
+            let mut block = self.matrix.fixed_view_mut::<6, 2>(6 * one, lens);
+            block -= folded * by_lens.transpose();
+        }
+        let folded = by_lens * inverse;
+        let mut block = self.matrix.fixed_view_mut::<2, 2>(lens, lens);
+        block -= folded * by_lens.transpose();
+        let mut rows = self.right.fixed_rows_mut::<2>(lens);
+        rows -= folded * side;
+        Some(Eliminated { inverse, side, cameras, lens: by_lens })
+    }
+
+    /// The step; zero for what stands still.
+    fn solve(mut self, free: Free, damping: f64) -> Option<DVector<f64>> {
+        let lens = self.lens;
+        let fixed = |unknown: usize| match free {
+            Free::Motion => unknown < 6 || unknown >= lens,
+            Free::MotionAndLens => unknown < 6,
+            Free::Camera(camera) => unknown / 6 != camera || unknown >= lens,
+        };
+        for row in 0..lens + 2 {
+            for column in row + 1..lens + 2 {
+                self.matrix[(column, row)] = self.matrix[(row, column)];
+            }
+        }
+        for unknown in 0..lens + 2 {
+            if fixed(unknown) {
+                self.matrix.row_mut(unknown).fill(0.0);
+                self.matrix.column_mut(unknown).fill(0.0);
+                self.matrix[(unknown, unknown)] = 1.0;
+                self.right[unknown] = 0.0;
+            } else {
+                self.matrix[(unknown, unknown)] += damping * self.matrix[(unknown, unknown)].abs() + 1e-12;
+            }
+        }
+        Some(self.matrix.cholesky()?.solve(&self.right))
     }
 }
 
@@ -319,8 +345,7 @@ mod tests {
                 Pose::from_translation(turn, Vector3::new(0.1, 0.0, 14.0 + 0.2 * f64::from(i)))
             })
             .collect();
-        let mut bundle =
-            Bundle { poses, points, observations: Vec::new(), focal: vec![800.0; 6], common };
+        let mut bundle = Bundle { poses, points, observations: Vec::new(), focal: vec![800.0; 6], common };
         bundle.observations = bundle
             .points
             .iter()

@@ -4,6 +4,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::epipolar::{Estimate, Pair, RelativePose, relative_pose};
+use super::factorize::affine_inliers;
 use super::features::{ViewFeatures, guided_matches, mutual_matches};
 use super::view::{Station, Track, View};
 
@@ -36,20 +37,27 @@ pub struct RemovedMatches {
     pub contradicting_tracks: usize,
 }
 
-/// Matches of every pair of views. With known `stations` their geometry checks; without, it is estimated. The seed of
-/// each pair's samples depends on the pair only.
-pub fn pairs(views: &[View], features: &[ViewFeatures], stations: Option<&[Option<Station>]>) -> Vec<PairMatches> {
-    let all: Vec<[usize; 2]> =
-        (0..views.len()).flat_map(|a| (a + 1..views.len()).map(move |b| [a, b])).collect();
-    all.into_par_iter().map(|pair| matched(pair, views, features, stations)).collect()
+/// Which geometry checks matches.
+#[derive(Debug, Clone, Copy)]
+pub enum Geometry<'a> {
+    /// Known cameras, one a view.
+    Known(&'a [Option<Station>]),
+    /// Known lenses: the essential matrix of each pair.
+    Lenses,
+    /// Nothing: the affine epipolar geometry of each pair, good where the building is far away for its depth.
+    Affine,
 }
 
-fn matched(
-    [a, b]: [usize; 2],
-    views: &[View],
-    features: &[ViewFeatures],
-    stations: Option<&[Option<Station>]>,
-) -> PairMatches {
+/// Distance from the affine epipolar line within which a match is right, pixels: perspective bends the lines.
+const AFFINE_INLIER_PX: f64 = 4.0;
+
+/// Matches of every pair of views, checked by `geometry`. The seed of each pair's samples depends on the pair only.
+pub fn pairs(views: &[View], features: &[ViewFeatures], geometry: Geometry<'_>) -> Vec<PairMatches> {
+    let all: Vec<[usize; 2]> = (0..views.len()).flat_map(|a| (a + 1..views.len()).map(move |b| [a, b])).collect();
+    all.into_par_iter().map(|pair| matched(pair, views, features, geometry)).collect()
+}
+
+fn matched([a, b]: [usize; 2], views: &[View], features: &[ViewFeatures], geometry: Geometry<'_>) -> PairMatches {
     let (one, other) = (&features[a], &features[b]);
     let mut alike = mutual_matches(one, other);
     alike.retain(|&[i, j]| one.ideal[i as usize][0].is_finite() && other.ideal[j as usize][0].is_finite());
@@ -60,12 +68,23 @@ fn matched(
     let directions: Vec<Pair> = alike.iter().map(|&pair| direction(pair)).collect();
     let threshold = 2.0 * INLIER_PX / (left.focal[0] + right.focal[0]);
     let none = |alike: usize| PairMatches { views: [a, b], alike, matches: Vec::new(), estimate: None };
-    let estimate = match stations {
-        Some(stations) => match (stations[a], stations[b]) {
+    let seed = (a * 65_536 + b) as u64;
+    let estimate = match geometry {
+        Geometry::Known(stations) => match (stations[a], stations[b]) {
             (Some(one), Some(other)) => known(&one, &other, &directions, threshold),
             _ => None,
         },
-        None => relative_pose(&directions, threshold, (a * 65_536 + b) as u64),
+        Geometry::Lenses => relative_pose(&directions, threshold, seed),
+        Geometry::Affine => {
+            let at = |[i, j]: [u32; 2]| [one.ideal[i as usize], other.ideal[j as usize]];
+            let images: Vec<_> = alike.iter().map(|&pair| at(pair)).collect();
+            let inliers = affine_inliers(&images, AFFINE_INLIER_PX, seed);
+            if inliers.len() < MIN_INLIERS {
+                return none(alike.len());
+            }
+            let matches = inliers.iter().map(|&number| alike[number]).collect();
+            return PairMatches { views: [a, b], alike: alike.len(), matches, estimate: None };
+        }
     };
     let Some(mut estimate) = estimate.filter(|estimate| estimate.inliers.len() >= MIN_INLIERS) else {
         return none(alike.len());
@@ -86,8 +105,8 @@ fn matched(
         }
     }
     let refined: Vec<Pair> = matches.iter().map(|&pair| direction(pair)).collect();
-    if stations.is_none() {
-        estimate.pose = estimate.pose.refined(refined.iter(), threshold / 2.0, 10);
+    if matches!(geometry, Geometry::Lenses) {
+        estimate.pose = estimate.pose.refined(&refined.iter(), threshold / 2.0, 10);
     }
     PairMatches { views: [a, b], alike: alike.len(), matches, estimate: Some(estimate) }
 }
@@ -119,12 +138,13 @@ pub fn tracks(features: &[ViewFeatures], pairs: &[PairMatches]) -> (Vec<Track>, 
     }
     let mut parent: Vec<usize> = (0..first[features.len()]).collect();
     for pair in pairs {
-        if pair.estimate.is_none() {
+        if pair.matches.is_empty() {
             removed.pair_without_geometry += pair.alike;
             continue;
         }
-        let kept = pair.estimate.as_ref().map_or(0, |estimate| estimate.inliers.len());
-        removed.off_epipolar_line += pair.alike - kept;
+        // Guided matches came afterwards.
+        let kept = pair.estimate.as_ref().map_or(pair.matches.len(), |estimate| estimate.inliers.len());
+        removed.off_epipolar_line += pair.alike - kept.min(pair.alike);
         for &[i, j] in &pair.matches {
             let a = root(&mut parent, first[pair.views[0]] + i as usize);
             let b = root(&mut parent, first[pair.views[1]] + j as usize);

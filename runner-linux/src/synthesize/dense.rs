@@ -142,8 +142,10 @@ pub fn dense(
         .zip(views_of_points.par_chunks(CHUNK))
         .flat_map_iter(|(positions, shown)| {
             positions.iter().zip(shown).map(|(position, view)| {
-                view.and_then(|view| colour(views.get(view as usize)?, stations.get(view as usize)?.as_ref()?, position))
-                    .unwrap_or((f32::NAN, [128; 3]))
+                view.and_then(|view| {
+                    colour(views.get(view as usize)?, stations.get(view as usize)?.as_ref()?, position)
+                })
+                .unwrap_or((f32::NAN, [128; 3]))
             })
         })
         .collect();
@@ -171,9 +173,10 @@ impl DenseCloud {
 
     /// The middle of all points.
     pub fn centroid(&self) -> Vector3<f64> {
-        let sum = self.positions.iter().fold(Vector3::zeros(), |sum, &[x, y, z]| {
-            sum + Vector3::new(f64::from(x), f64::from(y), f64::from(z))
-        });
+        let sum = self
+            .positions
+            .iter()
+            .fold(Vector3::zeros(), |sum, &[x, y, z]| sum + Vector3::new(f64::from(x), f64::from(y), f64::from(z)));
         sum / self.positions.len().max(1) as f64
     }
 }

@@ -70,14 +70,15 @@ impl RelativePose {
     fn twins(&self) -> [Self; 4] {
         let half_turn = 2.0 * self.direction * self.direction.transpose() - Matrix3::identity();
         let twisted = half_turn * self.rotation;
-        [self.rotation, twisted].map(|rotation| [1.0, -1.0].map(|sign| Self { rotation, direction: self.direction * sign }))
+        [self.rotation, twisted]
+            .map(|rotation| [1.0, -1.0].map(|sign| Self { rotation, direction: self.direction * sign }))
             .concat()
             .try_into()
             .unwrap_or([*self; 4])
     }
 
     /// The twin that has the most pairs in front of both views.
-    fn in_front<'p>(&self, pairs: impl Iterator<Item = &'p Pair> + Clone) -> Self {
+    fn in_front<'p>(&self, pairs: &(impl Iterator<Item = &'p Pair> + Clone)) -> Self {
         let count = |pose: &Self| {
             pairs.clone().filter(|pair| pose.depths(pair).is_some_and(|[a, b]| a > 0.0 && b > 0.0)).count()
         };
@@ -125,15 +126,14 @@ impl RelativePose {
         // No step beyond what linearization bears.
         let limit = if length > 0.5 { 0.5 / length } else { 1.0 };
         let turn = Rotation3::from_scaled_axis(Vector3::new(wx, wy, wz) * limit);
-        let next = Self {
-            rotation: turn.matrix() * self.rotation,
-            direction: (t + (b * db + c * dc) * limit).normalize(),
-        };
+        let next =
+            Self { rotation: turn.matrix() * self.rotation, direction: (t + (b * db + c * dc) * limit).normalize() };
         length.is_finite().then_some((next, length))
     }
 
     /// Robust least squares over these pairs; `scale` is where pairs begin to fade.
-    pub fn refined<'p>(mut self, pairs: impl Iterator<Item = &'p Pair> + Clone, scale: f64, steps: usize) -> Self {
+    #[must_use]
+    pub fn refined<'p>(mut self, pairs: &(impl Iterator<Item = &'p Pair> + Clone), scale: f64, steps: usize) -> Self {
         for _ in 0..steps {
             let Some((next, length)) = self.step(pairs.clone(), scale) else { break };
             self = next;
@@ -177,7 +177,8 @@ pub fn relative_pose(pairs: &[Pair], threshold: f64, seed: u64) -> Option<Estima
         (0..pairs.len()).filter(|&number| squared_distance(&essential, &pairs[number]) < limit).collect()
     };
     let mut random = SplitMix64::new(seed);
-    let starts = [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [1.0, 0.0, -1.0], [0.0, 1.0, 0.0]].map(Vector3::from);
+    let starts =
+        [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [1.0, 0.0, -1.0], [0.0, 1.0, 0.0]].map(Vector3::from);
     let mut best: Option<(RelativePose, f64)> = None;
     let mut needed = SAMPLES;
     let mut drawn = 0;
@@ -199,7 +200,7 @@ pub fn relative_pose(pairs: &[Pair], threshold: f64, seed: u64) -> Option<Estima
             let rotation = known.map_or(Matrix3::identity(), |pose| pose.rotation);
             let mut pose = RelativePose { rotation, direction: start.normalize() };
             let five = || sample.iter().map(|&number| &pairs[number]);
-            pose = pose.refined(five(), 1e3, STEPS);
+            pose = pose.refined(&five(), 1e3, STEPS);
             if five().any(|pair| !(pose.squared_distance(pair) < 1e-4 * limit)) {
                 continue;
             }
@@ -210,7 +211,7 @@ pub fn relative_pose(pairs: &[Pair], threshold: f64, seed: u64) -> Option<Estima
             best = Some((pose, now));
             for _ in 0..3 {
                 let inliers = inliers_of(&pose);
-                let refined = pose.refined(inliers.iter().map(|&number| &pairs[number]), threshold, 6);
+                let refined = pose.refined(&inliers.iter().map(|&number| &pairs[number]), threshold, 6);
                 let lower = cost(&refined);
                 if best.is_some_and(|best| lower >= best.1) {
                     break;
@@ -225,7 +226,7 @@ pub fn relative_pose(pairs: &[Pair], threshold: f64, seed: u64) -> Option<Estima
     }
     let (pose, _) = best?;
     let agreeing = inliers_of(&pose);
-    let pose = pose.in_front(agreeing.iter().map(|&number| &pairs[number]));
+    let pose = pose.in_front(&agreeing.iter().map(|&number| &pairs[number]));
     let inliers: Vec<usize> = agreeing
         .into_iter()
         .filter(|&number| pose.depths(&pairs[number]).is_some_and(|[a, b]| a > 0.0 && b > 0.0))

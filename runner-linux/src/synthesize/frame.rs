@@ -36,7 +36,8 @@ pub fn upright(made: &Reconstruction, scale: &Scale) -> Option<Similarity> {
     let forward = (forward - up * forward.dot(&up)).try_normalize(1e-9)?;
     let right = forward.cross(&up);
     let rotation = Matrix3::from_rows(&[right.transpose(), forward.transpose(), up.transpose()]);
-    let turned: Vec<Vector3<f64>> = made.model.surface.vertices.iter().map(|vertex| rotation * vertex.position).collect();
+    let turned: Vec<Vector3<f64>> =
+        made.model.surface.vertices.iter().map(|vertex| rotation * vertex.position).collect();
     let range = |axis: usize| {
         let mut values: Vec<f64> = turned.iter().map(|point| point[axis]).collect();
         values.sort_unstable_by(f64::total_cmp);

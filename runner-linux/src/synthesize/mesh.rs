@@ -5,7 +5,7 @@
 //! is dropped if it is seen at a grazing angle by both (it bridges a step in depth), and if it would hide a point that
 //! some view sees. Pairs join in the order given: a triangle enters where nothing lies yet.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -69,7 +69,13 @@ pub fn delaunay(points: &[[f64; 2]]) -> Vec<[u32; 3]> {
             let [a, b, c] = face.vertices().map(|vertex| number(vertex.fix()));
             // The least number first: a form of its own for each triangle.
             let first = a.min(b).min(c);
-            if first == a { [a, b, c] } else if first == b { [b, c, a] } else { [c, a, b] }
+            if first == a {
+                [a, b, c]
+            } else if first == b {
+                [b, c, a]
+            } else {
+                [c, a, b]
+            }
         })
         .collect();
     triangles.sort_unstable();
@@ -83,9 +89,14 @@ fn tidy(value: f64) -> f64 {
 /// The surface that these pairs of views give.
 ///
 /// `stations` has one entry a view. Triangles come out counter-clockwise seen from the views that see them.
-pub fn surface(vertices: Vec<Vertex>, stations: &[Option<Station>], pairs: &[[usize; 2]]) -> (Surface, Dropped) {
+pub fn surface(
+    vertices: Vec<Vertex>,
+    stations: &[Option<Station>],
+    pairs: &[[usize; 2]],
+    spacing_px: f64,
+) -> (Surface, Dropped) {
     let candidates: Vec<(Vec<[u32; 3]>, Dropped)> =
-        pairs.par_iter().map(|&pair| pair_triangles(&vertices, stations, pair)).collect();
+        pairs.par_iter().map(|&pair| pair_triangles(&vertices, stations, pair, spacing_px)).collect();
     let mut dropped = Dropped::default();
     let mut triangles: Vec<[u32; 3]> = Vec::new();
     // Directed edges: each belongs to one triangle, so that the surface is one that core's mesh accepts.
@@ -124,20 +135,22 @@ fn pair_triangles(
     vertices: &[Vertex],
     stations: &[Option<Station>],
     [first, second]: [usize; 2],
+    spacing_px: f64,
 ) -> (Vec<[u32; 3]>, Dropped) {
     let mut dropped = Dropped::default();
     let (Some(Some(one)), Some(Some(other))) = (stations.get(first), stations.get(second)) else {
         return (Vec::new(), dropped);
     };
-    let mut shared = Vec::new();
-    let (mut left, mut right) = (Vec::new(), Vec::new());
-    for (number, vertex) in (0_u32..).zip(vertices) {
-        if let (Some(a), Some(b)) = (vertex.track.seen_by(first), vertex.track.seen_by(second)) {
-            shared.push(number);
-            left.push(a);
-            right.push(b);
-        }
+    let mut both: Vec<(u32, [f64; 2], [f64; 2])> = (0_u32..)
+        .zip(vertices)
+        .filter_map(|(number, vertex)| Some((number, vertex.track.seen_by(first)?, vertex.track.seen_by(second)?)))
+        .collect();
+    if spacing_px > 0.0 {
+        both = spaced(vertices, both, spacing_px);
     }
+    let shared: Vec<u32> = both.iter().map(|point| point.0).collect();
+    let left: Vec<[f64; 2]> = both.iter().map(|point| point.1).collect();
+    let right: Vec<[f64; 2]> = both.iter().map(|point| point.2).collect();
     let mut kept = Vec::new();
     for triangle in delaunay(&left) {
         let [a, b, c] = triangle.map(|index| index as usize);
@@ -158,6 +171,36 @@ fn pair_triangles(
         }
     }
     (kept, dropped)
+}
+
+/// Of points that lie close together in the first view only the best: seen by the most views, with the least error.
+fn spaced(
+    vertices: &[Vertex],
+    mut points: Vec<(u32, [f64; 2], [f64; 2])>,
+    spacing_px: f64,
+) -> Vec<(u32, [f64; 2], [f64; 2])> {
+    points.sort_by(|a, b| {
+        let (p, q) = (&vertices[a.0 as usize], &vertices[b.0 as usize]);
+        let views = q.track.sightings.len().cmp(&p.track.sightings.len());
+        views.then(p.reprojection_px.total_cmp(&q.reprojection_px)).then(a.0.cmp(&b.0))
+    });
+    let cell = |at: [f64; 2]| at.map(|c| libm::floor(c / spacing_px) as i64);
+    let mut kept: BTreeMap<[i64; 2], Vec<[f64; 2]>> = BTreeMap::new();
+    points.retain(|&(_, at, _)| {
+        let [x, y] = cell(at);
+        let near = |other: &[f64; 2]| {
+            let (dx, dy) = (other[0] - at[0], other[1] - at[1]);
+            dx * dx + dy * dy < spacing_px * spacing_px
+        };
+        let around = (x - 1..=x + 1).flat_map(|x| (y - 1..=y + 1).map(move |y| [x, y]));
+        if around.filter_map(|cell| kept.get(&cell)).flatten().any(near) {
+            return false;
+        }
+        kept.entry([x, y]).or_default().push(at);
+        true
+    });
+    points.sort_by_key(|point| point.0);
+    points
 }
 
 /// Twice the signed area; positive from +x towards +y.

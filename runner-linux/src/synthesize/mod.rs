@@ -19,6 +19,7 @@
 pub mod view;
 pub mod features;
 pub mod epipolar;
+pub mod factorize;
 pub mod correspond;
 pub mod bundle;
 pub mod motion;

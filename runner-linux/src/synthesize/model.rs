@@ -23,15 +23,18 @@ pub struct Model {
 
 impl Model {
     /// Triangulates the tracks, spans the surface between them pair by pair, and chooses the views for its texture.
+    ///
+    /// Points that lie closer than `spacing_px` to a better one in a view do not carry that view's surface.
     pub fn new(
         views: &[View],
         stations: &[Option<Station>],
         tracks: &[Track],
         pairs: &[[usize; 2]],
         rules: &Rules,
+        spacing_px: f64,
     ) -> Self {
         let (vertices, refused) = points(tracks, stations, rules);
-        let (surface, dropped) = surface(vertices, stations, pairs);
+        let (surface, dropped) = surface(vertices, stations, pairs, spacing_px);
         let shown = best_views(&surface, views, stations);
         Self { surface, shown, refused, dropped }
     }

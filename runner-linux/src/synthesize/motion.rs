@@ -103,7 +103,9 @@ fn first_pair(pairs: &[PairMatches]) -> Result<&PairMatches, NoMotion> {
     let usable = || pairs.iter().filter_map(|pair| Some((pair, pair.estimate.as_ref()?)));
     let score = |pair: &PairMatches, parallax: f64| pair.matches.len() as f64 * parallax.min(10.0);
     let good = usable().filter(|(_, estimate)| {
-        estimate.rotation_share < MAX_ROTATION && estimate.plane_share < MAX_PLANE && estimate.parallax_degree >= MIN_PARALLAX
+        estimate.rotation_share < MAX_ROTATION
+            && estimate.plane_share < MAX_PLANE
+            && estimate.parallax_degree >= MIN_PARALLAX
     });
     let best = good.max_by(|a, b| score(a.0, a.1.parallax_degree).total_cmp(&score(b.0, b.1.parallax_degree)));
     if let Some((pair, _)) = best {
@@ -131,9 +133,10 @@ pub fn motion(views: &[View], pairs: &[PairMatches], tracks: &[Track], free_lens
     let first = first_pair(pairs)?;
     let mut growth = Growth::new(views, pairs, tracks);
     growth.poses[first.views[0]] = Some(Pose::identity());
-    let pose = first.estimate.as_ref().map_or(Pose::identity(), |estimate| {
-        Pose::from_translation(estimate.pose.rotation, estimate.pose.direction)
-    });
+    let pose = first
+        .estimate
+        .as_ref()
+        .map_or(Pose::identity(), |estimate| Pose::from_translation(estimate.pose.rotation, estimate.pose.direction));
     growth.poses[first.views[1]] = Some(pose);
     growth.order = first.views.to_vec();
     growth.triangulate();
@@ -335,7 +338,9 @@ impl<'a> Growth<'a> {
     fn with_length(&self, view: usize, base: &Pose, rotation: &Matrix3<f64>, shift: &Vector3<f64>) -> Option<Pose> {
         let mut lengths = Vec::new();
         for (track, point) in self.tracks.iter().zip(&self.points) {
-            let (Some(point), Some(&(_, at, _))) = (point, track.iter().find(|sighting| sighting.0 == view)) else { continue };
+            let (Some(point), Some(&(_, at, _))) = (point, track.iter().find(|sighting| sighting.0 == view)) else {
+                continue;
+            };
             let Some([x, y]) = self.direction(view, at) else { continue };
             let ray = Vector3::new(x, y, 1.0);
             // ray x (R p + s t) = 0, by least squares over its three rows.

@@ -5,8 +5,9 @@ use std::fmt;
 
 use serde::Serialize;
 
-use super::correspond::{self, PairMatches, RemovedMatches};
+use super::correspond::{self, Geometry, PairMatches, RemovedMatches};
 use super::epipolar::relative_pose;
+use super::factorize::{NoShape, factorize};
 use super::features::{ViewFeatures, features};
 use super::model::Model;
 use super::motion::{NoMotion, motion};
@@ -34,6 +35,8 @@ pub enum Cameras {
         /// Whether to adjust them.
         free_lens: bool,
     },
+    /// Not even a focal length: affine cameras.
+    Affine,
 }
 
 /// A model that was made, with what led to it.
@@ -51,8 +54,22 @@ pub struct Reconstruction {
     pub removed: RemovedMatches,
     /// Tracks that entered.
     pub tracks: usize,
-    /// Whether lengths mean something: cameras known.
-    pub metric: bool,
+    /// What lengths and angles mean.
+    pub shape: Shape,
+}
+
+/// What lengths and angles of a model mean.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Shape {
+    /// Lengths have the unit of the cameras' file.
+    Metric,
+    /// Right up to scale.
+    UpToScale,
+    /// Right up to scale and mirroring in depth: weak perspective.
+    UpToMirror,
+    /// Right up to an affine map: neither lengths nor angles mean anything.
+    Affine,
 }
 
 /// What a pair of views shares.
@@ -75,6 +92,8 @@ pub struct PairFacts {
 pub enum NoModel {
     /// The motion of the camera cannot be known.
     Motion(NoMotion),
+    /// Without a focal length there is no shape.
+    Shape(NoShape),
     /// Cameras are known, and do not fit the pictures.
     OtherCameras {
         /// Look-alikes of the best pair.
@@ -97,6 +116,7 @@ impl fmt::Display for NoModel {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Motion(reason) => reason.fmt(f),
+            Self::Shape(reason) => reason.fmt(f),
             Self::OtherCameras { alike, agreeing } => write!(
                 f,
                 "the cameras are not those of these pictures: of {alike} look-alikes of the best pair only {agreeing} agree \
@@ -127,9 +147,14 @@ pub fn reconstruct(
         Cameras::Known(poses) => {
             Some(views.iter().zip(poses).map(|(view, pose)| Station::new(&view.lens, *pose)).collect())
         }
-        Cameras::Unknown { .. } => None,
+        Cameras::Unknown { .. } | Cameras::Affine => None,
     };
-    let (matches, tracks, removed) = correspondences(&views, stations.as_deref(), corners)?;
+    let geometry = match (&stations, cameras) {
+        (Some(stations), _) => Geometry::Known(stations),
+        (None, Cameras::Affine) => Geometry::Affine,
+        (None, _) => Geometry::Lenses,
+    };
+    let (matches, tracks, removed) = correspondences(&views, geometry, corners)?;
     let facts = matches
         .iter()
         .map(|pair| PairFacts {
@@ -140,13 +165,26 @@ pub fn reconstruct(
             plane_share: pair.estimate.as_ref().map_or(0.0, |estimate| estimate.plane_share),
         })
         .collect();
+    let mut shape = Shape::UpToScale;
+    let mut rules = *rules;
     let (views, stations, tracks) = match (cameras, stations) {
+        (Cameras::Affine, _) => {
+            let found = factorize(&tracks, views.len()).map_err(NoModel::Shape)?;
+            shape = if found.metric { Shape::UpToMirror } else { Shape::Affine };
+            // Angles mean nothing yet, and perspective is an error here.
+            rules.max_reprojection_px = rules.max_reprojection_px.max(3.0 * found.rms_px);
+            if !found.metric {
+                rules.min_parallax_degree = 0.0;
+            }
+            (views, found.stations, found.tracks)
+        }
         (Cameras::Unknown { free_lens }, _) => {
             let found = motion(&views, &matches, &tracks, *free_lens).map_err(NoModel::Motion)?;
             let views = views.into_iter().zip(found.lenses).map(|(view, lens)| View { lens, ..view }).collect();
             (views, found.stations, found.tracks)
         }
         (Cameras::Known(_), stations) => {
+            shape = Shape::Metric;
             let best = matches.iter().max_by_key(|pair| pair.alike);
             let agreeing = matches.iter().map(|pair| pair.matches.len()).max().unwrap_or(0);
             if let (Some(best), Corners::Automatic) = (best, corners)
@@ -158,24 +196,27 @@ pub fn reconstruct(
         }
     };
     let order = mesh_pairs(&tracks, views.len());
-    let model = Model::new(&views, &stations, &tracks, &order, rules);
+    let spacing = if matches!(corners, Corners::Automatic) { AUTOMATIC_SPACING_PX } else { 0.0 };
+    let model = Model::new(&views, &stations, &tracks, &order, &rules, spacing);
     if model.surface.triangles.is_empty() {
         return Err(NoModel::TooFewPoints { points: model.surface.vertices.len(), refused: model.refused });
     }
-    let metric = matches!(cameras, Cameras::Known(_));
-    Ok(Reconstruction { views, stations, model, pairs: facts, removed, tracks: tracks.len(), metric })
+    Ok(Reconstruction { views, stations, model, pairs: facts, removed, tracks: tracks.len(), shape })
 }
+
+/// Automatic corners closer than this do not both carry the surface, pixels: their noise would fold it.
+const AUTOMATIC_SPACING_PX: f64 = 7.0;
 
 type Found = (Vec<PairMatches>, Vec<Track>, RemovedMatches);
 
-fn correspondences(views: &[View], stations: Option<&[Option<Station>]>, corners: &Corners) -> Result<Found, NoModel> {
+fn correspondences(views: &[View], geometry: Geometry<'_>, corners: &Corners) -> Result<Found, NoModel> {
     match corners {
         Corners::Automatic => {
             let found: Vec<ViewFeatures> = views
                 .par_iter()
                 .map(|view| features(view).map_err(|error| NoModel::Picture(format!("{}: {error}", view.name))))
                 .collect::<Result<_, _>>()?;
-            let pairs = correspond::pairs(views, &found, stations);
+            let pairs = correspond::pairs(views, &found, geometry);
             let (tracks, removed) = correspond::tracks(&found, &pairs);
             Ok((pairs, tracks, removed))
         }
@@ -184,13 +225,14 @@ fn correspondences(views: &[View], stations: Option<&[Option<Station>]>, corners
             for (number, (view, corners)) in views.iter().zip(corners).enumerate() {
                 for (&corner, &at) in corners {
                     if let Some(ideal) = view.lens.ideal_from_picture(at) {
-                        let track = tracks.entry(corner).or_insert_with(|| Track { number: corner, sightings: Vec::new() });
+                        let track =
+                            tracks.entry(corner).or_insert_with(|| Track { number: corner, sightings: Vec::new() });
                         track.sightings.push((number, ideal));
                     }
                 }
             }
             let tracks: Vec<Track> = tracks.into_values().filter(|track| track.sightings.len() > 1).collect();
-            let pairs = picked_pairs(views, &tracks, stations.is_some());
+            let pairs = picked_pairs(views, &tracks, !matches!(geometry, Geometry::Lenses));
             Ok((pairs, tracks, RemovedMatches::default()))
         }
     }

@@ -24,8 +24,12 @@ impl DepthBuffer {
         positions: &[[f64; 3]],
         triangles: &[[u32; 3]],
     ) -> Self {
-        let mut buffer =
-            Self { width, height, depths: vec![f32::INFINITY; width * height], triangles: vec![u32::MAX; width * height] };
+        let mut buffer = Self {
+            width,
+            height,
+            depths: vec![f32::INFINITY; width * height],
+            triangles: vec![u32::MAX; width * height],
+        };
         let image: Vec<Option<[f64; 3]>> = positions
             .iter()
             .map(|&position| {
@@ -34,7 +38,8 @@ impl DepthBuffer {
             })
             .collect();
         for (number, triangle) in (0_u32..).zip(triangles) {
-            let [Some(a), Some(b), Some(c)] = triangle.map(|vertex| image.get(vertex as usize).copied().flatten()) else {
+            let [Some(a), Some(b), Some(c)] = triangle.map(|vertex| image.get(vertex as usize).copied().flatten())
+            else {
                 continue;
             };
             buffer.draw(number, [a, b, c]);
@@ -55,7 +60,8 @@ impl DepthBuffer {
         for y in range(1, self.height) {
             for x in range(0, self.width) {
                 let (px, py) = (x as f64, y as f64);
-                let weight = |p: [f64; 3], q: [f64; 3]| ((q[0] - p[0]) * (py - p[1]) - (q[1] - p[1]) * (px - p[0])) / area;
+                let weight =
+                    |p: [f64; 3], q: [f64; 3]| ((q[0] - p[0]) * (py - p[1]) - (q[1] - p[1]) * (px - p[0])) / area;
                 let (u, v) = (weight(b, c), weight(c, a));
                 let w = 1.0 - u - v;
                 if u < 0.0 || v < 0.0 || w < 0.0 {

@@ -2,11 +2,11 @@
 
 use serde::Serialize;
 
+use super::correspond::RemovedMatches;
 use super::dense::DenseCloud;
 use super::mesh::Dropped;
-use super::reconstruct::{PairFacts, Reconstruction};
+use super::reconstruct::{PairFacts, Reconstruction, Shape};
 use super::triangulate::Refusals;
-use super::correspond::RemovedMatches;
 
 /// Version of the form of `--json`.
 pub const SCHEMA_VERSION: u32 = 1;
@@ -18,7 +18,9 @@ pub struct Facts {
     pub schema_version: u32,
     /// Version of the program.
     pub program_version: &'static str,
-    /// What a length of one means: `metre`, `camera_file_unit` or `first_baseline`.
+    /// What lengths and angles mean at all.
+    pub shape: Shape,
+    /// What a length of one means: `metre`, `camera_file_unit`, `first_baseline`, `model_height`, or `affine` for nothing.
     pub length_unit: &'static str,
     /// The views, in the order given.
     pub views: Vec<ViewFacts>,
@@ -112,8 +114,9 @@ pub fn facts(made: &Reconstruction, dense: &DenseCloud, length_unit: &'static st
             size_px: [view.gray.width, view.gray.height],
             focal_px: view.lens.focal[0],
             position: made.stations[number].map(|station| station.pose.position.into()),
-            view_from_model: made.stations[number]
-                .map(|station| [0, 1, 2].map(|row| [0, 1, 2].map(|column| station.pose.view_from_model[(row, column)]))),
+            view_from_model: made.stations[number].map(|station| {
+                [0, 1, 2].map(|row| [0, 1, 2].map(|column| station.pose.view_from_model[(row, column)]))
+            }),
             points: sums[number].1,
             points_lost_without: sums[number].2,
             reprojection_rms_px: rms(sums[number].0, sums[number].1),
@@ -130,6 +133,7 @@ pub fn facts(made: &Reconstruction, dense: &DenseCloud, length_unit: &'static st
     Facts {
         schema_version: SCHEMA_VERSION,
         program_version: env!("CARGO_PKG_VERSION"),
+        shape: made.shape,
         length_unit,
         views,
         pairs: made.pairs.clone(),
@@ -159,7 +163,8 @@ fn coverage(made: &Reconstruction) -> Vec<f64> {
         let size = [view.gray.width.div_ceil(8), view.gray.height.div_ceil(8)];
         let triangles = &made.model.surface.triangles;
         let buffer = super::render::DepthBuffer::new(&station.pinhole, size, 0.125, &positions, triangles);
-        buffer.triangles.iter().filter(|triangle| **triangle != u32::MAX).count() as f64 / buffer.triangles.len().max(1) as f64
+        buffer.triangles.iter().filter(|triangle| **triangle != u32::MAX).count() as f64
+            / buffer.triangles.len().max(1) as f64
     };
     made.views.iter().zip(&made.stations).map(share).collect()
 }

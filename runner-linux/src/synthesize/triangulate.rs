@@ -46,8 +46,7 @@ impl Refusals {
 
 /// The points of all tracks that `stations` (one a view; `None` for views without a place) see well enough.
 pub fn points(tracks: &[Track], stations: &[Option<Station>], rules: &Rules) -> (Vec<Vertex>, Refusals) {
-    let results: Vec<Result<Vertex, Refusals>> =
-        tracks.par_iter().map(|track| point(track, stations, rules)).collect();
+    let results: Vec<Result<Vertex, Refusals>> = tracks.par_iter().map(|track| point(track, stations, rules)).collect();
     let mut refused = Refusals::default();
     let mut vertices = Vec::with_capacity(results.len());
     for result in results {

@@ -1,5 +1,6 @@
 //! `daymark study`: experiments that anybody can repeat.
 
+pub mod subdivision;
 pub mod towers;
 
 use super::{CommandError, Outcome};
@@ -15,6 +16,8 @@ pub struct Args {
 enum Study {
     /// Which of eight towers is it? Models from two noisy views against models from all sides
     Towers(towers::Args),
+    /// How far should subdivision go? Errors within and between the eight towers, time and memory of each level
+    Subdivision(subdivision::Args),
 }
 
 /// Runs the study that was asked for.
@@ -24,5 +27,6 @@ enum Study {
 pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     match &args.study {
         Study::Towers(args) => towers::run(args),
+        Study::Subdivision(args) => subdivision::run(args),
     }
 }

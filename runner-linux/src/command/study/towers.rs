@@ -43,7 +43,7 @@ pub struct Args {
 
 fn not_negative(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
-        Ok(value) if value >= 0.0 && value < 100.0 => Ok(value),
+        Ok(value) if (0.0..100.0).contains(&value) => Ok(value),
         _ => Err("give a number from 0 to 100".to_owned()),
     }
 }
@@ -262,7 +262,8 @@ fn text(document: &Document) -> String {
         }
         text.push('\n');
     }
-    let _ = writeln!(text, "\nIntensity: share of the test's variance that the base does not explain (gain and bias free)");
+    let _ =
+        writeln!(text, "\nIntensity: share of the test's variance that the base does not explain (gain and bias free)");
     heads(&mut text, "");
     for (row, name) in document.rows.iter().zip(&document.towers) {
         let _ = write!(text, "{:<16}", format!("{} {name}", row.tower));

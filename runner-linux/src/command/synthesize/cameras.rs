@@ -26,7 +26,7 @@ pub(super) fn cameras(
     fixed_lens: bool,
 ) -> Result<(Vec<Lens>, Cameras), CommandError> {
     if !files.is_empty() {
-        return from_files(images, sizes, files, fixed_lens);
+        return from_files(images, sizes, files);
     }
     if let Some(focal) = focal_px {
         let longest = sizes.iter().flatten().copied().max().unwrap_or(0);
@@ -36,29 +36,25 @@ pub(super) fn cameras(
         let lenses = sizes.iter().map(|&[width, height]| Lens::of_focal(width, height, focal)).collect();
         return Ok((lenses, Cameras::Unknown { free_lens: !fixed_lens }));
     }
-    let lenses = images
-        .iter()
+    let focal: Vec<Option<f64>> = images.iter().map(|path| film_focal(path)).collect();
+    if focal.iter().any(Option::is_none) {
+        // Nothing is known: affine cameras need no focal length. Any number keeps the lens a lens.
+        let lenses = sizes.iter().map(|&[width, height]| Lens::of_focal(width, height, f64::from(width.max(height))));
+        return Ok((lenses.collect(), Cameras::Affine));
+    }
+    let lenses = focal
+        .into_iter()
+        .flatten()
         .zip(sizes)
-        .map(|(path, &[width, height])| {
-            let film = film_focal(path).ok_or_else(|| {
-                format!(
-                    "the focal length of {} is not known: its EXIF does not say it; give --focal-px or --cameras",
-                    path.display()
-                )
-            })?;
-            Ok(Lens::of_focal(width, height, film / FILM_WIDTH_MM * f64::from(width.max(height))))
+        .map(|(film, &[width, height])| {
+            Lens::of_focal(width, height, film / FILM_WIDTH_MM * f64::from(width.max(height)))
         })
-        .collect::<Result<_, String>>()?;
+        .collect();
     // EXIF rounds to a millimetre.
     Ok((lenses, Cameras::Unknown { free_lens: !fixed_lens }))
 }
 
-fn from_files(
-    images: &[PathBuf],
-    sizes: &[[u32; 2]],
-    files: &[PathBuf],
-    fixed_lens: bool,
-) -> Result<(Vec<Lens>, Cameras), CommandError> {
+fn from_files(images: &[PathBuf], sizes: &[[u32; 2]], files: &[PathBuf]) -> Result<(Vec<Lens>, Cameras), CommandError> {
     let mut found: Vec<(&Path, Vec<FileCamera>)> = Vec::new();
     for path in files {
         found.push((path, read(path)?));
@@ -72,8 +68,9 @@ fn from_files(
                 let same = |camera: &&FileCamera| {
                     camera.picture.as_deref().is_some_and(|picture| View::name_of(Path::new(picture)) == name)
                 };
-                cameras.iter().find(same).map(|camera| (*path, camera.clone())).ok_or_else(|| {
-                    CameraFileError { path: path.to_path_buf(), what: format!("it has {} pictures, and {name} is not among them", cameras.len()) }
+                cameras.iter().find(same).map(|camera| (*path, camera.clone())).ok_or_else(|| CameraFileError {
+                    path: path.to_path_buf(),
+                    what: format!("it has {} pictures, and {name} is not among them", cameras.len()),
                 })
             })
             .collect::<Result<_, _>>()?,
@@ -108,7 +105,6 @@ fn from_files(
         return Ok((lenses, Cameras::Known(poses)));
     }
     // A calibrated lens is better than what a few pictures say about it.
-    let _ = fixed_lens;
     Ok((lenses, Cameras::Unknown { free_lens: false }))
 }
 

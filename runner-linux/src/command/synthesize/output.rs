@@ -11,7 +11,7 @@ use crate::model_file::sheet::sheets;
 use crate::model_file::{Format, gltf, obj, ply};
 use crate::report::{data_uri, page as html};
 use crate::synthesize::dense::DenseCloud;
-use crate::synthesize::reconstruct::Reconstruction;
+use crate::synthesize::reconstruct::{Reconstruction, Shape};
 use crate::synthesize::render::DepthBuffer;
 use crate::synthesize::report::Facts;
 use crate::table_file::replace_file;
@@ -78,8 +78,11 @@ pub(super) fn preview(made: &Reconstruction, dense: &DenseCloud) -> Vec<u8> {
     let positions: Vec<[f64; 3]> = dense.positions.iter().map(|p| p.map(f64::from)).collect();
     let buffer = DepthBuffer::new(&station.pinhole, size, scale, &positions, &dense.triangles);
     let colours: Vec<[u8; 3]> = dense.patch_colours().collect();
-    let pixels: Vec<u8> =
-        buffer.triangles.iter().flat_map(|&triangle| colours.get(triangle as usize).copied().unwrap_or([236; 3])).collect();
+    let pixels: Vec<u8> = buffer
+        .triangles
+        .iter()
+        .flat_map(|&triangle| colours.get(triangle as usize).copied().unwrap_or([236; 3]))
+        .collect();
     let mut bytes = Vec::new();
     // A picture in memory can be encoded.
     let _ = PngEncoder::new(&mut bytes).write_image(&pixels, size[0] as u32, size[1] as u32, ExtendedColorType::Rgb8);
@@ -92,6 +95,8 @@ pub(super) fn text(facts: &Facts, path: &Path, explain: bool) -> String {
     let unit = match facts.length_unit {
         "metre" => "m",
         "camera_file_unit" => "units of the camera file",
+        "model_height" => "times its own height (up to scale: give --height-m)",
+        "affine" => "without meaning: two pictures and no focal length give the shape up to an affine map only",
         _ => "times the distance of the first two cameras (up to scale: give --distance-m or --height-m)",
     };
     let _ = writeln!(text, "{}", path.display());
@@ -112,6 +117,10 @@ pub(super) fn text(facts: &Facts, path: &Path, explain: bool) -> String {
     );
     let [x, y, z] = facts.extent;
     let _ = writeln!(text, "  {x:.2} x {y:.2} x {z:.2} {unit}");
+    if facts.shape == Shape::UpToMirror {
+        let _ =
+            writeln!(text, "  no focal length: affine cameras; the model may be mirrored in depth (give --focal-px)");
+    }
     for (number, view) in (1..).zip(&facts.views) {
         if view.position.is_some() {
             let _ = writeln!(
