@@ -50,6 +50,20 @@ impl GrayImage {
     }
 }
 
+/// Colours of a picture scaled as [`GrayImage::scaled_to`] scales: three channels, one after the other.
+#[must_use]
+pub fn scaled_colours(rgb: &[u8], width: usize, height: usize, side: usize) -> Vec<u8> {
+    if width.max(height) == side || rgb.is_empty() {
+        return rgb.to_vec();
+    }
+    let channels = [0, 1, 2].map(|channel| {
+        let pixels = rgb.iter().skip(channel).step_by(3).copied().collect();
+        GrayImage { pixels, width, height }.scaled_to(side).pixels
+    });
+    let [red, green, blue] = &channels;
+    red.iter().zip(green).zip(blue).flat_map(|((&r, &g), &b)| [r, g, b]).collect()
+}
+
 /// Bilinear enlargement; pixel areas align, the border repeats outwards. Positions in Q16, weights in Q8.
 fn interpolated(image: &GrayImage, width: usize, height: usize) -> GrayImage {
     let place = |at: usize, from: usize, to: usize| {
@@ -112,6 +126,18 @@ fn area_average(image: &GrayImage, width: usize, height: usize) -> GrayImage {
 /// # Errors
 /// [`PictureError`], which names the file and what to do.
 pub fn read_gray(path: &Path) -> Result<GrayImage, PictureError> {
+    read(path, false).map(|picture| picture.0)
+}
+
+/// The same with its colours: red, green and blue of each pixel, rows packed.
+///
+/// # Errors
+/// [`PictureError`].
+pub fn read_colour(path: &Path) -> Result<(GrayImage, Vec<u8>), PictureError> {
+    read(path, true)
+}
+
+fn read(path: &Path, colour: bool) -> Result<(GrayImage, Vec<u8>), PictureError> {
     let fail = |reason| PictureError { path: path.to_owned(), reason };
     let io = |error: std::io::Error| fail(Reason::Io(error.to_string()));
     let metadata = std::fs::metadata(path).map_err(io)?;
@@ -120,7 +146,7 @@ pub fn read_gray(path: &Path) -> Result<GrayImage, PictureError> {
     }
     let mut file = BufReader::new(File::open(path).map_err(io)?);
     if !file.fill_buf().map_err(io)?.starts_with(&[0xFF, 0xD8]) {
-        return decode(file).map_err(fail);
+        return decode(file, colour).map_err(fail);
     }
     // A JPEG is looked through for its end first; other files are decoded as they are read.
     let mut bytes = Vec::new();
@@ -128,10 +154,10 @@ pub fn read_gray(path: &Path) -> Result<GrayImage, PictureError> {
     if is_cut_jpeg(&bytes) {
         return Err(fail(Reason::Damaged("its end is missing".to_owned())));
     }
-    decode(Cursor::new(bytes)).map_err(fail)
+    decode(Cursor::new(bytes), colour).map_err(fail)
 }
 
-fn decode(mut file: impl BufRead + Seek) -> Result<GrayImage, Reason> {
+fn decode(mut file: impl BufRead + Seek, colour: bool) -> Result<(GrayImage, Vec<u8>), Reason> {
     if file.fill_buf().map_err(|error| Reason::Io(error.to_string()))?.is_empty() {
         return Err(Reason::Empty);
     }
@@ -152,12 +178,19 @@ fn decode(mut file: impl BufRead + Seek) -> Result<GrayImage, Reason> {
     decoder.set_limits(limits).map_err(Reason::of_decoder)?;
     let orientation = decoder.orientation().unwrap_or(Orientation::NoTransforms);
     let mut image = DynamicImage::from_decoder(decoder).map_err(Reason::of_decoder)?;
+    let rgb = if colour {
+        let mut upright = DynamicImage::ImageRgb8(image.to_rgb8());
+        upright.apply_orientation(orientation);
+        upright.into_rgb8().into_raw()
+    } else {
+        Vec::new()
+    };
     let mut gray = DynamicImage::ImageLuma8(luma(&mut image));
     drop(image);
     gray.apply_orientation(orientation);
     let gray = gray.into_luma8();
     let (width, height) = (gray.width() as usize, gray.height() as usize);
-    Ok(GrayImage { pixels: gray.into_raw(), width, height })
+    Ok((GrayImage { pixels: gray.into_raw(), width, height }, rgb))
 }
 
 /// Rec. 601 luma in integers, as JPEG files and most cameras define gray; alpha multiplies.

@@ -1,7 +1,9 @@
-//! How a camera sees points of space.
+//! How a camera sees points of space, and what two or more cameras say about a point.
 //!
 //! **Camera frame.** The origin is the centre of projection, x points right, y down as in the image, z along the optical axis
 //! into the scene. Lengths in metres, image coordinates in pixels from the principal point.
+//!
+//! Triangulation takes whole cameras instead: image coordinates as in [`crate::point`], points in the model frame.
 
 mod adjust;
 mod draw;
@@ -14,6 +16,7 @@ pub mod direction;
 pub mod facade;
 pub mod pose;
 pub mod weak_perspective;
+pub mod triangulate;
 
 pub use intrinsics::{Intrinsics, NoCamera};
 pub use placement::CameraFromModel;

@@ -5,11 +5,13 @@
 
 pub mod bench;
 pub mod correspond;
+pub mod classify;
 pub mod demo;
 pub mod enroll;
 pub mod evaluate;
 pub mod recognize;
 pub mod study;
+pub mod synthesize;
 pub mod table;
 pub mod watch;
 
@@ -38,6 +40,10 @@ enum Command {
     Recognize(recognize::Args),
     /// Match the corners of two pictures, by their places alone
     Correspond(correspond::Args),
+    /// Make a textured 3D model of a building from two or more pictures
+    Synthesize(synthesize::Args),
+    /// Say which of several models a model is, by shape and appearance
+    Classify(classify::Args),
     /// Look into, check, merge and change landmark tables
     Table(table::Args),
     /// Measure recall, false answers and time on a folder of pictures with a manifest
@@ -82,6 +88,8 @@ impl Cli {
             Command::Enroll(args) => enroll::run(&args),
             Command::Recognize(args) => recognize::run(&args),
             Command::Correspond(args) => correspond::run(&args),
+            Command::Synthesize(args) => synthesize::run(&args),
+            Command::Classify(args) => classify::run(&args),
             Command::Table(args) => table::run(&args),
             Command::Evaluate(args) => evaluate::run(&args),
             Command::Bench(args) => bench::run(&args),

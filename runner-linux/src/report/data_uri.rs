@@ -14,6 +14,11 @@ pub fn png(image: &GrayImage) -> String {
     if encoded.is_ok() { format!("data:image/png;base64,{}", base64(&bytes)) } else { String::new() }
 }
 
+/// A PNG file in a `data:` address.
+pub fn png_bytes(bytes: &[u8]) -> String {
+    format!("data:image/png;base64,{}", base64(bytes))
+}
+
 /// The picture as a JPEG of medium quality in a `data:` address; about a tenth of the PNG.
 pub fn jpeg(image: &GrayImage) -> String {
     let mut bytes = Vec::new();

@@ -60,6 +60,11 @@ pub fn escape(text: &str) -> String {
     escaped
 }
 
+/// Several lines of text as HTML: [`escape`] that keeps line ends.
+pub fn escape_lines(text: &str) -> String {
+    text.lines().map(escape).collect::<Vec<_>>().join("\n")
+}
+
 /// A number to remember and what it is.
 pub fn tile(value: &str, what: &str) -> String {
     format!("<div class=\"tile\"><b>{}</b><span>{}</span></div>\n", escape(value), escape(what))

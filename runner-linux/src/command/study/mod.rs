@@ -3,6 +3,8 @@
 pub mod correspondence;
 pub mod fix;
 pub mod repeatability;
+pub mod subdivision;
+pub mod towers;
 
 use super::{CommandError, Outcome};
 
@@ -21,6 +23,10 @@ enum Study {
     Repeatability(repeatability::Args),
     /// Where an observer stands who walks among the eight towers: errors, and how far the stated ones are true
     Fix(fix::Args),
+    /// Which of eight towers is it? Models from two noisy views against models from all sides
+    Towers(towers::Args),
+    /// How far should subdivision go? Errors within and between the eight towers, time and memory of each level
+    Subdivision(subdivision::Args),
 }
 
 /// Runs the study that was asked for.
@@ -32,5 +38,7 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
         Study::Correspondence(args) => correspondence::run(args),
         Study::Repeatability(args) => repeatability::run(args),
         Study::Fix(args) => fix::run(args),
+        Study::Towers(args) => towers::run(args),
+        Study::Subdivision(args) => subdivision::run(args),
     }
 }

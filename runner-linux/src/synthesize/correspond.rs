@@ -1,0 +1,180 @@
+//! Which features of which views are the same point: look-alikes, checked by epipolar geometry, joined to tracks.
+
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::epipolar::{Estimate, Pair, RelativePose, relative_pose};
+use super::factorize::affine_inliers;
+use super::features::{ViewFeatures, guided_matches, mutual_matches};
+use super::view::{Station, Track, View};
+
+/// Distance from the epipolar line within which a match is right, pixels of the working size.
+pub const INLIER_PX: f64 = 1.5;
+/// Fewer agreeing matches may be chance: a pair of views with fewer is not used.
+pub const MIN_INLIERS: usize = 24;
+
+/// What became of the matches of a pair of views.
+#[derive(Debug, Clone)]
+pub struct PairMatches {
+    /// The views.
+    pub views: [usize; 2],
+    /// Look-alikes before any geometry.
+    pub alike: usize,
+    /// Numbers of the features that match, one of each view.
+    pub matches: Vec<[u32; 2]>,
+    /// The relative pose; `None` if the views do not share enough.
+    pub estimate: Option<Estimate>,
+}
+
+/// Why matches were removed, over all pairs.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+pub struct RemovedMatches {
+    /// Look-alikes of pairs of views without a common geometry.
+    pub pair_without_geometry: usize,
+    /// Off the epipolar line, or behind a camera.
+    pub off_epipolar_line: usize,
+    /// Tracks that hold two features of one view: some match in them is wrong.
+    pub contradicting_tracks: usize,
+}
+
+/// Which geometry checks matches.
+#[derive(Debug, Clone, Copy)]
+pub enum Geometry<'a> {
+    /// Known cameras, one a view.
+    Known(&'a [Option<Station>]),
+    /// Known lenses: the essential matrix of each pair.
+    Lenses,
+    /// Nothing: the affine epipolar geometry of each pair, good where the building is far away for its depth.
+    Affine,
+}
+
+/// Distance from the affine epipolar line within which a match is right, pixels: perspective bends the lines.
+const AFFINE_INLIER_PX: f64 = 4.0;
+
+/// Matches of every pair of views, checked by `geometry`. The seed of each pair's samples depends on the pair only.
+pub fn pairs(views: &[View], features: &[ViewFeatures], geometry: Geometry<'_>) -> Vec<PairMatches> {
+    let all: Vec<[usize; 2]> = (0..views.len()).flat_map(|a| (a + 1..views.len()).map(move |b| [a, b])).collect();
+    all.into_par_iter().map(|pair| matched(pair, views, features, geometry)).collect()
+}
+
+fn matched([a, b]: [usize; 2], views: &[View], features: &[ViewFeatures], geometry: Geometry<'_>) -> PairMatches {
+    let (one, other) = (&features[a], &features[b]);
+    let mut alike = mutual_matches(one, other);
+    alike.retain(|&[i, j]| one.ideal[i as usize][0].is_finite() && other.ideal[j as usize][0].is_finite());
+    let (left, right) = (&views[a].lens, &views[b].lens);
+    let direction = |[i, j]: [u32; 2]| -> Pair {
+        [left.normalized_from_ideal(one.ideal[i as usize]), right.normalized_from_ideal(other.ideal[j as usize])]
+    };
+    let directions: Vec<Pair> = alike.iter().map(|&pair| direction(pair)).collect();
+    let threshold = 2.0 * INLIER_PX / (left.focal[0] + right.focal[0]);
+    let none = |alike: usize| PairMatches { views: [a, b], alike, matches: Vec::new(), estimate: None };
+    let seed = (a * 65_536 + b) as u64;
+    let estimate = match geometry {
+        Geometry::Known(stations) => match (stations[a], stations[b]) {
+            (Some(one), Some(other)) => known(&one, &other, &directions, threshold),
+            _ => None,
+        },
+        Geometry::Lenses => relative_pose(&directions, threshold, seed),
+        Geometry::Affine => {
+            let at = |[i, j]: [u32; 2]| [one.ideal[i as usize], other.ideal[j as usize]];
+            let images: Vec<_> = alike.iter().map(|&pair| at(pair)).collect();
+            let inliers = affine_inliers(&images, AFFINE_INLIER_PX, seed);
+            if inliers.len() < MIN_INLIERS {
+                return none(alike.len());
+            }
+            let matches = inliers.iter().map(|&number| alike[number]).collect();
+            return PairMatches { views: [a, b], alike: alike.len(), matches, estimate: None };
+        }
+    };
+    let Some(mut estimate) = estimate.filter(|estimate| estimate.inliers.len() >= MIN_INLIERS) else {
+        return none(alike.len());
+    };
+    let mut matches: Vec<[u32; 2]> = estimate.inliers.iter().map(|&number| alike[number]).collect();
+    // With the geometry known, look-alikes that were not clear before may be now.
+    let limit = threshold * threshold;
+    let near = |from: [f64; 2], to: [f64; 2]| {
+        if !(from[0].is_finite() && to[0].is_finite()) {
+            return false;
+        }
+        let pair = [left.normalized_from_ideal(from), right.normalized_from_ideal(to)];
+        estimate.pose.squared_distance(&pair) < limit
+    };
+    for pair in guided_matches(one, other, &matches, near) {
+        if estimate.pose.depths(&direction(pair)).is_some_and(|[a, b]| a > 0.0 && b > 0.0) {
+            matches.push(pair);
+        }
+    }
+    let refined: Vec<Pair> = matches.iter().map(|&pair| direction(pair)).collect();
+    if matches!(geometry, Geometry::Lenses) {
+        estimate.pose = estimate.pose.refined(&refined.iter(), threshold / 2.0, 10);
+    }
+    PairMatches { views: [a, b], alike: alike.len(), matches, estimate: Some(estimate) }
+}
+
+/// The same with a geometry that is known.
+fn known(one: &Station, other: &Station, directions: &[Pair], threshold: f64) -> Option<Estimate> {
+    let rotation = other.pose.view_from_model * one.pose.view_from_model.transpose();
+    let shift = other.pose.to_view(&one.pose.position);
+    if !(shift.norm() > 0.0) {
+        return None;
+    }
+    let pose = RelativePose { rotation, direction: shift.normalize() };
+    let inliers: Vec<usize> = (0..directions.len())
+        .filter(|&number| {
+            let pair = &directions[number];
+            pose.squared_distance(pair) < threshold * threshold
+                && pose.depths(pair).is_some_and(|[a, b]| a > 0.0 && b > 0.0)
+        })
+        .collect();
+    Some(Estimate { pose, inliers, parallax_degree: 0.0, rotation_share: 0.0, plane_share: 0.0 })
+}
+
+/// Joins matches to tracks: one feature a view and track; the others are wrong somewhere and go.
+pub fn tracks(features: &[ViewFeatures], pairs: &[PairMatches]) -> (Vec<Track>, RemovedMatches) {
+    let mut removed = RemovedMatches::default();
+    let mut first = vec![0_usize];
+    for view in features {
+        first.push(first[first.len() - 1] + view.points.len());
+    }
+    let mut parent: Vec<usize> = (0..first[features.len()]).collect();
+    for pair in pairs {
+        if pair.matches.is_empty() {
+            removed.pair_without_geometry += pair.alike;
+            continue;
+        }
+        // Guided matches came afterwards.
+        let kept = pair.estimate.as_ref().map_or(pair.matches.len(), |estimate| estimate.inliers.len());
+        removed.off_epipolar_line += pair.alike - kept.min(pair.alike);
+        for &[i, j] in &pair.matches {
+            let a = root(&mut parent, first[pair.views[0]] + i as usize);
+            let b = root(&mut parent, first[pair.views[1]] + j as usize);
+            // The least number is the root, whatever the order of the matches.
+            parent[a.max(b)] = a.min(b);
+        }
+    }
+    let mut groups: std::collections::BTreeMap<usize, Vec<(usize, [f64; 2])>> = std::collections::BTreeMap::new();
+    for (view, found) in features.iter().enumerate() {
+        for (number, at) in found.ideal.iter().enumerate() {
+            let node = root(&mut parent, first[view] + number);
+            groups.entry(node).or_default().push((view, *at));
+        }
+    }
+    let mut tracks = Vec::new();
+    for sightings in groups.into_values().filter(|sightings| sightings.len() > 1) {
+        // Ascending by view, because nodes are.
+        if sightings.windows(2).any(|two| two[0].0 == two[1].0) {
+            removed.contradicting_tracks += 1;
+        } else {
+            tracks.push(Track { number: tracks.len() as u32 + 1, sightings });
+        }
+    }
+    (tracks, removed)
+}
+
+fn root(parent: &mut [usize], mut node: usize) -> usize {
+    while parent[node] != node {
+        parent[node] = parent[parent[node]];
+        node = parent[node];
+    }
+    node
+}

@@ -1,0 +1,182 @@
+//! The dense cloud: every point of a level of midpoint subdivision, with its deviation and its colour.
+
+use std::fmt;
+
+use daymark_core::mesh::{MeshCounts, MeshError, SubdivisionLevel, TriangleMesh, storage_words};
+use nalgebra::Vector3;
+use rayon::prelude::*;
+
+use super::view::{Station, Surface, View};
+
+/// Points of a dense cloud, at most: with triangles 1.2 GB ([`BYTES_PER_POINT`]).
+pub const MAX_POINTS: u64 = 24_000_000;
+/// Bytes that a dense cloud takes for each of its points: position, deviation, colour, gray, and about two triangles.
+pub const BYTES_PER_POINT: u64 = 12 + 4 + 3 + 4 + 2 * 12;
+/// Points that are coloured by one task.
+const CHUNK: usize = 1 << 14;
+
+/// The points of a level of subdivision.
+///
+/// Points are the vertices of the surface, then those inside its edges, then those inside its triangles; triangles follow
+/// the surface's, `4^level` for each.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DenseCloud {
+    /// The level.
+    pub level: SubdivisionLevel,
+    /// Positions in the model frame.
+    pub positions: Vec<[f32; 3]>,
+    /// Root of the trace of each position's covariance.
+    pub deviations: Vec<f32>,
+    /// Gray level of each point in the view that shows its triangle best, 0 black to 1 white; NaN where no view does.
+    pub gray: Vec<f32>,
+    /// Red, green, blue of each point.
+    pub rgb: Vec<[u8; 3]>,
+    /// Triangles as numbers of points.
+    pub triangles: Vec<[u32; 3]>,
+}
+
+/// Why there is no dense cloud.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum DenseError {
+    /// The surface is none.
+    Mesh(MeshError),
+    /// More points than [`MAX_POINTS`].
+    TooMany {
+        /// The level.
+        level: u8,
+        /// Its points.
+        points: u64,
+    },
+}
+
+impl fmt::Display for DenseError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Mesh(error) => write!(f, "the triangles are no surface: {error}"),
+            Self::TooMany { level, points } => write!(
+                f,
+                "level {level} of this mesh has {points} points, {} MB; the limit is {MAX_POINTS}: give a smaller --levels",
+                points * BYTES_PER_POINT / 1_000_000
+            ),
+        }
+    }
+}
+
+impl std::error::Error for DenseError {}
+
+/// The counts of a level, before anything is made.
+///
+/// # Errors
+/// [`DenseError::Mesh`].
+pub fn counts(surface: &Surface, level: SubdivisionLevel) -> Result<MeshCounts, DenseError> {
+    let (triangles, mut storage) = prepared(surface)?;
+    let mesh = TriangleMesh::new(surface.vertices.len(), &triangles, &mut storage).map_err(DenseError::Mesh)?;
+    Ok(mesh.counts().at(level))
+}
+
+fn prepared(surface: &Surface) -> Result<(Vec<[u16; 3]>, Vec<u32>), DenseError> {
+    let found = surface.vertices.len();
+    let limit = daymark_core::mesh::MAX_VERTICES;
+    if found > limit {
+        return Err(DenseError::Mesh(MeshError::TooManyVertices { found, limit }));
+    }
+    let triangles = surface.triangles.iter().map(|triangle| triangle.map(|vertex| vertex as u16)).collect::<Vec<_>>();
+    let storage = vec![0; storage_words(found, triangles.len())];
+    Ok((triangles, storage))
+}
+
+/// The dense cloud of a surface, coloured by the views (`shown[t]` shows triangle `t`).
+///
+/// A point between corners `a, b, c` with weights `w` is `sum w p`: its covariance is `sum w² C`, because corners are
+/// triangulated independently. The result does not depend on the number of threads.
+///
+/// # Errors
+/// [`DenseError`].
+pub fn dense(
+    surface: &Surface,
+    level: SubdivisionLevel,
+    views: &[View],
+    stations: &[Option<Station>],
+    shown: &[Option<u32>],
+) -> Result<DenseCloud, DenseError> {
+    let (base, mut storage) = prepared(surface)?;
+    let mesh = TriangleMesh::new(surface.vertices.len(), &base, &mut storage).map_err(DenseError::Mesh)?;
+    let fine = mesh.subdivided(level);
+    let counts = fine.counts();
+    if counts.vertices > MAX_POINTS {
+        return Err(DenseError::TooMany { level: level.number(), points: counts.vertices });
+    }
+    let corners: Vec<[f32; 3]> =
+        surface.vertices.iter().map(|vertex| <[f64; 3]>::from(vertex.position).map(|c| c as f32)).collect();
+    let mut positions = vec![[0.0; 3]; counts.vertices as usize];
+    fine.write_values(&corners, &mut positions).map_err(DenseError::Mesh)?;
+    let mut triangles = vec![[0; 3]; counts.triangles as usize];
+    fine.write_triangles(&mut triangles).map_err(DenseError::Mesh)?;
+
+    // A vertex belongs to the first triangle that has it.
+    let mut triangle_of_vertex = vec![None; surface.vertices.len()];
+    for (number, triangle) in (0_u32..).zip(&surface.triangles) {
+        for &vertex in triangle {
+            triangle_of_vertex[vertex as usize].get_or_insert(number);
+        }
+    }
+    let steps = f64::from(level.steps());
+    let variances: Vec<f64> = surface.vertices.iter().map(|vertex| vertex.covariance.trace()).collect();
+    let mut deviations = Vec::with_capacity(positions.len());
+    let mut views_of_points = Vec::with_capacity(positions.len());
+    for point in fine.points() {
+        let parts = point.corners.iter().zip(point.weights);
+        let variance: f64 = parts
+            .map(|(&corner, weight)| {
+                let share = f64::from(weight) / steps;
+                share * share * variances[usize::from(corner)]
+            })
+            .sum();
+        deviations.push(libm::sqrt(variance) as f32);
+        let triangle = point.triangle.or(triangle_of_vertex[usize::from(point.corners[0])]);
+        views_of_points.push(triangle.and_then(|triangle| shown.get(triangle as usize).copied().flatten()));
+    }
+    let coloured: Vec<(f32, [u8; 3])> = positions
+        .par_chunks(CHUNK)
+        .zip(views_of_points.par_chunks(CHUNK))
+        .flat_map_iter(|(positions, shown)| {
+            positions.iter().zip(shown).map(|(position, view)| {
+                view.and_then(|view| {
+                    colour(views.get(view as usize)?, stations.get(view as usize)?.as_ref()?, position)
+                })
+                .unwrap_or((f32::NAN, [128; 3]))
+            })
+        })
+        .collect();
+    let (gray, rgb) = coloured.into_iter().unzip();
+    Ok(DenseCloud { level, positions, deviations, gray, rgb, triangles })
+}
+
+fn colour(view: &View, station: &Station, position: &[f32; 3]) -> Option<(f32, [u8; 3])> {
+    let at = view.lens.picture_from_ideal(station.pinhole.project(position.map(f64::from))?);
+    let rgb = view.colour_at(at).map(|channel| (channel + 0.5) as u8);
+    // The mean of a square of 2 px: what a point stands for is more than a pixel's middle.
+    let offsets = [[-0.5, -0.5], [0.5, -0.5], [-0.5, 0.5], [0.5, 0.5]];
+    let sum: f64 = offsets.iter().map(|[dx, dy]| view.gray_at([at[0] + dx, at[1] + dy])).sum();
+    Some(((sum / (4.0 * 255.0)) as f32, rgb))
+}
+
+impl DenseCloud {
+    /// The colour of each triangle by the rule of the thesis (6.2): the mean of its three points'.
+    pub fn patch_colours(&self) -> impl ExactSizeIterator<Item = [u8; 3]> + '_ {
+        self.triangles.iter().map(|triangle| {
+            let [a, b, c] = triangle.map(|point| self.rgb[point as usize].map(u32::from));
+            [0, 1, 2].map(|channel: usize| ((a[channel] + b[channel] + c[channel] + 1) / 3) as u8)
+        })
+    }
+
+    /// The middle of all points.
+    pub fn centroid(&self) -> Vector3<f64> {
+        let sum = self
+            .positions
+            .iter()
+            .fold(Vector3::zeros(), |sum, &[x, y, z]| sum + Vector3::new(f64::from(x), f64::from(y), f64::from(z)));
+        sum / self.positions.len().max(1) as f64
+    }
+}
