@@ -126,7 +126,7 @@ fn geojson_and_text_go_to_files_at_once() {
 #[test]
 fn pictures_that_are_good_for_nothing_are_named() {
     let town = town();
-    let edge = |x: u32| if x / 40 % 2 == 0 { 60.0 } else { 190.0 };
+    let edge = |x: u32| if (x / 40).is_multiple_of(2) { 60.0 } else { 190.0 };
     let blurred = |x: u32, _: u32| ((0..24).map(|d| edge(x + d)).sum::<f64>() / 24.0) as u8;
     town.draw("frames/030.pgm", 320, 240, |x, _| (x % 7) as u8);
     town.draw("frames/031.pgm", 320, 240, |_, _| 254);

@@ -1,7 +1,7 @@
 //! Many frames with many faults: memory stays flat, no thread stays, and no building is missed.
 //!
 //! The plumbing is soaked with a stub that recognizes a number written into the frame. The real recognizer is soaked by
-//! `cargo test --release -p daymark --test watch_soak -- --ignored`, which takes some minutes.
+//! `cargo test --release -p daymark --test watch_soak -- --ignored`, which takes some minutes; SOAK_FRAMES changes its length.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -133,7 +133,7 @@ impl Form for Counting {
         match record {
             Record::Frame(frame) => {
                 told.frames += 1;
-                if frame.at.frame % 5_000 == 2_500 {
+                if frame.at.frame % 250 == 125 {
                     told.memory.extend(resident_bytes());
                 }
             }
@@ -192,9 +192,10 @@ fn soak<L: Look>(opener: Box<dyn Opener>, look: L, planned: &[Planned]) -> Told 
 }
 
 fn assert_flat(memory: &[u64]) {
-    let (first, last) = (memory[1], memory[memory.len() - 1]);
+    // After a tenth of the run everything that is allocated once is there.
+    let (first, last) = (memory[memory.len() / 10], memory[memory.len() - 1]);
     println!("resident memory: {first} bytes early, {last} at the end");
-    assert!(last <= first + (2 << 20), "{memory:?}");
+    assert!(last <= first + (2 << 20), "{first} bytes early, {last} at the end");
 }
 
 #[test]
@@ -258,9 +259,9 @@ fn twenty_thousand_frames_through_the_real_recognizer() {
     enroll.args(["enroll", "--name", "Gate", "--no-lint", "--table"]).arg(&table).arg(&picture);
     assert!(enroll.status().expect("it runs").success());
     let look = Recognizing::new(LiveTable::load(&table).expect("a table"), FalseAnswer::ONE_PERCENT);
-    let frames = 20_000;
+    let frames = std::env::var("SOAK_FRAMES").ok().and_then(|frames| frames.parse().ok()).unwrap_or(20_000);
     let told = soak(Box::new(Again(read_gray(&picture).expect("a picture"), frames)), look, &faults(frames, 40));
     assert_eq!(told.frames, frames);
-    assert!(told.given.len() > 100 && told.withdrawn == told.given.len() as u64);
+    assert!(told.given.len() as u64 > frames / 400 && told.withdrawn == told.given.len() as u64);
     assert_flat(&told.memory);
 }

@@ -26,6 +26,7 @@ use crate::watch::table::{LiveTable, Reloader};
 
 /// Arguments of `daymark watch`.
 #[derive(Debug, clap::Args)]
+#[allow(clippy::struct_excessive_bools, reason = "each is a flag")]
 #[command(
     group(clap::ArgGroup::new("source").required(true).args(["camera", "input", "frames", "list"])),
     after_help = "Exit codes: 0 some answer was given, or it was asked to stop; 1 the frames ended without an answer; 2 an \
@@ -143,7 +144,7 @@ impl Format {
 
 fn rate(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
-        Ok(value) if value >= 1e-3 && value <= 1e6 => Ok(value),
+        Ok(value) if (1e-3..=1e6).contains(&value) => Ok(value),
         _ => Err("give a number between 0.001 and 1000000".to_owned()),
     }
 }

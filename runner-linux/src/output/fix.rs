@@ -64,7 +64,7 @@ impl Fix {
             latitude_deg: landmark.latitude_deg,
             longitude_deg: landmark.longitude_deg,
             altitude_m: None,
-            error: ErrorEllipse::circle((landmark.error_m + reach_m) / 2.0),
+            error: ErrorEllipse::circle(f64::midpoint(landmark.error_m, reach_m)),
             bearing_deg: None,
             range_m: None,
             heading_deg: None,

@@ -143,7 +143,9 @@ impl<L: Look> Run<L> {
         // One chunk for each target, whatever a frame gave rise to.
         for Output { form, sink } in &mut self.outputs {
             let mut bytes = Vec::new();
-            records.iter().for_each(|record| form.write(record, &mut bytes));
+            for record in records {
+                form.write(record, &mut bytes);
+            }
             if !bytes.is_empty() {
                 sink.write(bytes);
             }
@@ -177,7 +179,7 @@ fn log(record: &Record) {
         }
         Record::Table(change) => match &change.error {
             None => {
-                tracing::info!(table_id = %change.table.table_id, landmarks = change.table.landmarks, "the new table is in use")
+                tracing::info!(table_id = %change.table.table_id, landmarks = change.table.landmarks, "the new table is in use");
             }
             Some(error) => {
                 tracing::error!(%error, table_id = %change.table.table_id, "the new table cannot be used; the old one stays in use");

@@ -1,5 +1,7 @@
 //! Exposure, gain and focus, where a camera has them. Automatic ones hunt when the camera passes from sky to wall.
 
+use std::fmt::Write as _;
+
 use v4l::Device;
 use v4l::control::{Control, Value};
 
@@ -43,9 +45,12 @@ impl Controls {
             // Not every device has an automatic to switch off.
             let _ = device.set_control(Control { id: automatic, value: off });
             match device.set_control(Control { id, value: Value::Integer(value) }) {
-                Ok(()) => said += &format!(", {name} {value}"),
+                Ok(()) => {
+                    // Writing to a string cannot fail.
+                    let _ = write!(said, ", {name} {value}");
+                }
                 Err(error) => {
-                    tracing::warn!(camera, control = name, value, %error, "the camera does not take this setting")
+                    tracing::warn!(camera, control = name, value, %error, "the camera does not take this setting");
                 }
             }
         }
