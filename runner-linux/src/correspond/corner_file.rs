@@ -192,7 +192,8 @@ mod tests {
 
     #[test]
     fn columns_in_any_order_comments_and_others_are_read() {
-        let corners = read("\u{feff}# of the tower\ny_px, name, number ,x_px\n# a remark\n2.5,roof,7,1\r\n-1,,3,0.04\n").unwrap();
+        let corners =
+            read("\u{feff}# of the tower\ny_px, name, number ,x_px\n# a remark\n2.5,roof,7,1\r\n-1,,3,0.04\n").unwrap();
         assert_eq!(corners.numbers, [7, 3]);
         assert_eq!(corners.places, [ImagePoint::new(16, 40), ImagePoint::new(1, -16)]);
     }

@@ -213,7 +213,10 @@ impl Drawing<'_> {
             let shift = found.shift.map(|shift| format!(", shift +{shift}")).unwrap_or_default();
             let residual = found.residual_px.map(|px| format!(", residual {px:.2} px")).unwrap_or_default();
             let [a, b] = found.layers.map(layer);
-            format!("{} is {}: layer {a} to {b}{shift}{residual}, found by {}", found.first, found.second, found.found_by)
+            format!(
+                "{} is {}: layer {a} to {b}{shift}{residual}, found by {}",
+                found.first, found.second, found.found_by
+            )
         })
     }
 
@@ -241,7 +244,8 @@ impl Drawing<'_> {
     fn legend(&self, quads: &[LayerQuadFate], top: f32, right: f32) -> Group {
         let mut group = Group::new();
         let all = phrase::count(quads.len(), "quad");
-        let mut lines = vec![(MARGIN, 0, None, format!("{all} of four vertices in a row, in the first picture's layers"))];
+        let mut lines =
+            vec![(MARGIN, 0, None, format!("{all} of four vertices in a row, in the first picture's layers"))];
         for (row, (fate, count)) in (1..).zip(quad_legend(quads)) {
             lines.push((MARGIN, row, Some(fate_colour(fate)), format!("{count} {}", fate.says())));
         }

@@ -181,7 +181,8 @@ impl<'a> Judge<'a> {
     /// What became of each four vertices in a row of the first picture's layers: the thesis' quads.
     pub fn quads(&self) -> Vec<LayerQuadFate> {
         let mut quads = Vec::new();
-        for (layer, vertices) in self.matching.nested[0].layers.iter().enumerate().filter(|(_, layer)| layer.len() > 3) {
+        for (layer, vertices) in self.matching.nested[0].layers.iter().enumerate().filter(|(_, layer)| layer.len() > 3)
+        {
             for start in 0..vertices.len() {
                 let four = [0, 1, 2, 3].map(|step| vertices[(start + step) % vertices.len()]);
                 quads.push(match self.matching.rule {

@@ -29,9 +29,7 @@ pub fn finding(finding: &Finding) -> String {
     }
     text.push('\n');
     if let Some(proposals) = finding.proposals {
-        for (source, counts) in
-            [("hull layers", proposals.layers), ("local arrangements", proposals.arrangements)]
-        {
+        for (source, counts) in [("hull layers", proposals.layers), ("local arrangements", proposals.arrangements)] {
             if let Some(line) = counts_line(counts) {
                 let _ = writeln!(text, "proposals of {source}: {line}");
             }
@@ -69,13 +67,19 @@ pub fn headline(finding: &Finding) -> String {
     let count = phrase::count(finding.correspondences.len(), "correspondence");
     match (&finding.map, finding.median_epipolar_distance_px, finding.agreeing_quads, &finding.reason) {
         (Some(map), ..) => {
-            format!("{count}: one map explains them, {:.0} bits beyond chance at {} px of noise", map.bits, map.noise_px)
+            format!(
+                "{count}: one map explains them, {:.0} bits beyond chance at {} px of noise",
+                map.bits, map.noise_px
+            )
         }
         (_, Some(median), ..) => format!(
             "{count}: a scene with relief; neighbours agree, and all with one epipolar constraint (median {median:.2} px)"
         ),
         (_, _, Some(quads), _) => {
-            format!("{count} by the plain rule: {} of the layers agree; nothing is verified", phrase::count(quads, "quad"))
+            format!(
+                "{count} by the plain rule: {} of the layers agree; nothing is verified",
+                phrase::count(quads, "quad")
+            )
         }
         (_, _, _, Some(reason)) => format!("no correspondence: {}", reason.message),
         _ => count,

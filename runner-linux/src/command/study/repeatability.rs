@@ -11,12 +11,14 @@ use std::fmt::Write as _;
 use std::io::{self, Write};
 use std::path::PathBuf;
 
+use clap::ValueEnum;
 use daymark_fixtures::Tower;
 use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
 use serde::Serialize;
 
 use self::pair::{Method, Pair, TOLERANCE_PX, Tally};
+use self::photos::WithCameras;
 use self::towers::{CORNER_NOISE_PX, Disturbance, see};
 use super::super::{CommandError, Outcome};
 use crate::correspond::MOST_CORNERS;
@@ -46,8 +48,11 @@ pub struct Args {
     /// The folder with photographs; without it only the towers are measured
     #[arg(long, value_name = "DIR", default_value = "../shared/photos")]
     photos: PathBuf,
+    /// What to measure on; the towers take longest
+    #[arg(long, value_enum, default_value_t = Scenes::All)]
+    scenes: Scenes,
     /// Random cases for each tower in lines with noise or missing corners
-    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u64).range(1..=1_000))]
+    #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u64).range(1..=1_000))]
     seeds: u64,
     /// Automatic corners of each picture, the strongest
     #[arg(long, value_name = "N", default_value_t = CORNERS_PER_IMAGE as u16,
@@ -56,6 +61,16 @@ pub struct Args {
     /// Print one JSON document instead of a table
     #[arg(long)]
     json: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Scenes {
+    /// Towers, and photographs where they are at hand
+    All,
+    /// The eight towers
+    Towers,
+    /// Photographs
+    Photos,
 }
 
 /// The JSON document.
@@ -113,8 +128,10 @@ struct Line {
 /// # Errors
 /// A photograph that cannot be read.
 pub fn run(args: &Args) -> Result<Outcome, CommandError> {
-    let mut lines = of_towers(args)?;
-    if args.photos.join("reconstruction").is_dir() {
+    let mut lines = if args.scenes == Scenes::Photos { Vec::new() } else { of_towers(args)? };
+    if args.scenes == Scenes::Towers {
+        // Asked for no photographs.
+    } else if args.photos.join("reconstruction").is_dir() {
         lines.extend(of_photos(args)?);
     } else {
         writeln!(io::stderr(), "no photographs in {}: the towers only (--photos DIR)", args.photos.display())?;
@@ -145,7 +162,12 @@ fn settings(seeds: u64) -> Vec<(&'static str, String, Disturbance, u64)> {
     let usual = Disturbance { angle: USUAL_ANGLE, gray_levels: 0, noise_px: 0.0, missing: 0.0 };
     let angles = ANGLES.map(|angle| ("view angle", format!("{angle} degrees"), Disturbance { angle, ..usual }, 1));
     let noise = NOISE_PX.map(|noise_px| {
-        ("corner noise", format!("{noise_px} px"), Disturbance { noise_px, ..usual }, if noise_px > 0.0 { seeds } else { 1 })
+        (
+            "corner noise",
+            format!("{noise_px} px"),
+            Disturbance { noise_px, ..usual },
+            if noise_px > 0.0 { seeds } else { 1 },
+        )
     });
     let missing = MISSING.map(|missing| {
         let cases = if missing > 0.0 { seeds } else { 1 };
@@ -173,7 +195,12 @@ fn of_towers(args: &Args) -> Result<Vec<Line>, CommandError> {
                 let Disturbance { angle, gray_levels, .. } = *disturbance;
                 let views = match last.take() {
                     Some(views) if (views.0, views.1) == (angle, gray_levels) => views,
-                    _ => (angle, gray_levels, see(tower, 0.0, gray_levels, 0, count)?, see(tower, angle, gray_levels, 1, count)?),
+                    _ => (
+                        angle,
+                        gray_levels,
+                        see(tower, 0.0, gray_levels, 0, count)?,
+                        see(tower, angle, gray_levels, 1, count)?,
+                    ),
                 };
                 let mut tally = Tally::default();
                 for case in 0..*cases {
@@ -188,10 +215,8 @@ fn of_towers(args: &Args) -> Result<Vec<Line>, CommandError> {
         })
         .collect();
     bar.finish_and_clear();
-    let mut lines: Vec<Line> = settings
-        .into_iter()
-        .map(|(group, setting, ..)| Line { group, setting, tally: Tally::default() })
-        .collect();
+    let mut lines: Vec<Line> =
+        settings.into_iter().map(|(group, setting, ..)| Line { group, setting, tally: Tally::default() }).collect();
     for tallies in measured? {
         for (line, tally) in lines.iter_mut().zip(&tallies) {
             line.tally.add(tally);
@@ -204,9 +229,10 @@ fn of_photos(args: &Args) -> Result<Vec<Line>, CommandError> {
     let count = usize::from(args.corners_per_image);
     let bar = progress(STEPS.len() + 1, "photographs");
     let mut lines = Vec::new();
+    let photos = WithCameras::read(&args.photos, count)?;
     for step in STEPS {
-        let pairs = photos::with_cameras(&args.photos, step, count)?;
-        lines.push(Line { group: "Herz-Jesus-P8", setting: format!("{step} apart"), tally: together(&pairs)? });
+        let tally = together(&photos.pairs(step))?;
+        lines.push(Line { group: "Herz-Jesus-P8", setting: format!("{step} apart"), tally });
         bar.inc(1);
     }
     let pairs = photos::with_planes(&args.photos, count)?;
@@ -273,7 +299,14 @@ fn text(document: &Document) -> String {
             let _ = writeln!(
                 text,
                 "\n{:<16}{:>6}{:>8}{:>8}   {:<19}{:<23}{:<23}{}",
-                line.group, "pairs", "again", "chance", "plain hulls", "tolerant hulls", "local arrangements", "both, verified"
+                line.group,
+                "pairs",
+                "again",
+                "chance",
+                "plain hulls",
+                "tolerant hulls",
+                "local arrangements",
+                "both, verified"
             );
         }
         let again = line.repeatability.map_or_else(|| "-".to_owned(), |share| format!("{:.0} %", share * 100.0));

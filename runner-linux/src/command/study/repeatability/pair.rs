@@ -1,9 +1,9 @@
 //! Two pictures with their corners and the truth about them, and what each way of matching makes of them.
 
+use daymark_core::geometry::GeometryError;
 use daymark_core::geometry::correspond::Sources;
 use daymark_core::geometry::proposal::Pairing;
 use daymark_core::geometry::quad::Tolerance;
-use daymark_core::geometry::GeometryError;
 use daymark_core::point::ImagePoint;
 use serde::Serialize;
 
@@ -179,9 +179,10 @@ impl Pair {
                 sum.right += usize::from(right);
             }
             let proposals = |proposed: &Proposed| {
-                proposed.kept.iter().any(|proposal| {
-                    proposal.pairs.iter().all(|&pair| self.is_right(pair) == Some(true))
-                })
+                proposed
+                    .kept
+                    .iter()
+                    .any(|proposal| proposal.pairs.iter().all(|&pair| self.is_right(pair) == Some(true)))
             };
             sum.proposed = usize::from(proposals(&matching.from_layers) || proposals(&matching.from_arrangements));
         }
