@@ -1,5 +1,6 @@
 //! `daymark correspond` from the outside: committed corners, made corners, broken files.
 
+#[allow(dead_code, reason = "other tests need the rest of it")]
 mod support;
 
 use std::fmt::Write as _;

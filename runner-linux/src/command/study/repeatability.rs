@@ -285,6 +285,10 @@ impl Line {
     }
 }
 
+/// What stands above the methods' columns, and how wide they are.
+const HEADS: [&str; 4] = ["plain hulls", "tolerant hulls", "local arrangements", "both, verified"];
+const WIDTHS: [usize; 4] = [19, 23, 23, 23];
+
 /// The table: of each method how many of its matches are right, and for how many pairs of pictures it had an answer; of
 /// hulls and arrangements also for how many pairs a proposal was right in all its corners.
 fn text(document: &Document) -> String {
@@ -296,23 +300,17 @@ fn text(document: &Document) -> String {
     for line in &document.lines {
         if line.group != group {
             group = line.group;
-            let _ = writeln!(
-                text,
-                "\n{:<16}{:>6}{:>8}{:>8}   {:<19}{:<23}{:<23}{}",
-                line.group,
-                "pairs",
-                "again",
-                "chance",
-                "plain hulls",
-                "tolerant hulls",
-                "local arrangements",
-                "both, verified"
-            );
+            let _ = write!(text, "\n{:<16} pairs   again  chance   ", line.group);
+            for (head, width) in HEADS.into_iter().zip(WIDTHS) {
+                let _ = write!(text, "{head:<width$}");
+            }
+            text.truncate(text.trim_end().len());
+            text.push('\n');
         }
         let again = line.repeatability.map_or_else(|| "-".to_owned(), |share| format!("{:.0} %", share * 100.0));
         let chance = format!("{:.1} %", line.right_by_chance * 100.0);
         let _ = write!(text, "{:<16}{:>6}{again:>8}{chance:>8}   ", line.setting, line.pairs);
-        for (method, width) in line.methods.iter().zip([19, 23, 23, 23]) {
+        for (method, width) in line.methods.iter().zip(WIDTHS) {
             let share = method.right_share.map_or_else(|| "-".to_owned(), |share| format!("{:.0} %", share * 100.0));
             let mut cell = format!("{share:>5} of {:<5}{:>3}", method.matches, method.pairs_answered);
             if method.method != Method::PlainHulls {
