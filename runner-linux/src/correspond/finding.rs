@@ -88,7 +88,7 @@ pub struct PictureFound {
 /// Why there are no correspondences.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Reason {
-    /// "nothing_proposed", "chance", "ambiguous" or "no_quad_agrees".
+    /// `nothing_proposed`, `chance`, `ambiguous` or `no_quad_agrees`.
     pub kind: &'static str,
     /// For people.
     pub message: String,

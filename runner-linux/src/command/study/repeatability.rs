@@ -11,12 +11,14 @@ use std::fmt::Write as _;
 use std::io::{self, Write};
 use std::path::PathBuf;
 
+use clap::ValueEnum;
 use daymark_fixtures::Tower;
 use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
 use serde::Serialize;
 
 use self::pair::{Method, Pair, TOLERANCE_PX, Tally};
+use self::photos::WithCameras;
 use self::towers::{CORNER_NOISE_PX, Disturbance, see};
 use super::super::{CommandError, Outcome};
 use crate::correspond::MOST_CORNERS;
@@ -46,8 +48,11 @@ pub struct Args {
     /// The folder with photographs; without it only the towers are measured
     #[arg(long, value_name = "DIR", default_value = "../shared/photos")]
     photos: PathBuf,
+    /// What to measure on; the towers take longest
+    #[arg(long, value_enum, default_value_t = Scenes::All)]
+    scenes: Scenes,
     /// Random cases for each tower in lines with noise or missing corners
-    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u64).range(1..=1_000))]
+    #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u64).range(1..=1_000))]
     seeds: u64,
     /// Automatic corners of each picture, the strongest
     #[arg(long, value_name = "N", default_value_t = CORNERS_PER_IMAGE as u16,
@@ -56,6 +61,16 @@ pub struct Args {
     /// Print one JSON document instead of a table
     #[arg(long)]
     json: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Scenes {
+    /// Towers, and photographs where they are at hand
+    All,
+    /// The eight towers
+    Towers,
+    /// Photographs
+    Photos,
 }
 
 /// The JSON document.
@@ -113,8 +128,10 @@ struct Line {
 /// # Errors
 /// A photograph that cannot be read.
 pub fn run(args: &Args) -> Result<Outcome, CommandError> {
-    let mut lines = of_towers(args)?;
-    if args.photos.join("reconstruction").is_dir() {
+    let mut lines = if args.scenes == Scenes::Photos { Vec::new() } else { of_towers(args)? };
+    if args.scenes == Scenes::Towers {
+        // Asked for no photographs.
+    } else if args.photos.join("reconstruction").is_dir() {
         lines.extend(of_photos(args)?);
     } else {
         writeln!(io::stderr(), "no photographs in {}: the towers only (--photos DIR)", args.photos.display())?;
@@ -212,9 +229,10 @@ fn of_photos(args: &Args) -> Result<Vec<Line>, CommandError> {
     let count = usize::from(args.corners_per_image);
     let bar = progress(STEPS.len() + 1, "photographs");
     let mut lines = Vec::new();
+    let photos = WithCameras::read(&args.photos, count)?;
     for step in STEPS {
-        let pairs = photos::with_cameras(&args.photos, step, count)?;
-        lines.push(Line { group: "Herz-Jesus-P8", setting: format!("{step} apart"), tally: together(&pairs)? });
+        let tally = together(&photos.pairs(step))?;
+        lines.push(Line { group: "Herz-Jesus-P8", setting: format!("{step} apart"), tally });
         bar.inc(1);
     }
     let pairs = photos::with_planes(&args.photos, count)?;
@@ -267,6 +285,10 @@ impl Line {
     }
 }
 
+/// What stands above the methods' columns, and how wide they are.
+const HEADS: [&str; 4] = ["plain hulls", "tolerant hulls", "local arrangements", "both, verified"];
+const WIDTHS: [usize; 4] = [19, 23, 23, 23];
+
 /// The table: of each method how many of its matches are right, and for how many pairs of pictures it had an answer; of
 /// hulls and arrangements also for how many pairs a proposal was right in all its corners.
 fn text(document: &Document) -> String {
@@ -278,23 +300,17 @@ fn text(document: &Document) -> String {
     for line in &document.lines {
         if line.group != group {
             group = line.group;
-            let _ = writeln!(
-                text,
-                "\n{:<16}{:>6}{:>8}{:>8}   {:<19}{:<23}{:<23}{}",
-                line.group,
-                "pairs",
-                "again",
-                "chance",
-                "plain hulls",
-                "tolerant hulls",
-                "local arrangements",
-                "both, verified"
-            );
+            let _ = write!(text, "\n{:<16} pairs   again  chance   ", line.group);
+            for (head, width) in HEADS.into_iter().zip(WIDTHS) {
+                let _ = write!(text, "{head:<width$}");
+            }
+            text.truncate(text.trim_end().len());
+            text.push('\n');
         }
         let again = line.repeatability.map_or_else(|| "-".to_owned(), |share| format!("{:.0} %", share * 100.0));
         let chance = format!("{:.1} %", line.right_by_chance * 100.0);
         let _ = write!(text, "{:<16}{:>6}{again:>8}{chance:>8}   ", line.setting, line.pairs);
-        for (method, width) in line.methods.iter().zip([19, 23, 23, 23]) {
+        for (method, width) in line.methods.iter().zip(WIDTHS) {
             let share = method.right_share.map_or_else(|| "-".to_owned(), |share| format!("{:.0} %", share * 100.0));
             let mut cell = format!("{share:>5} of {:<5}{:>3}", method.matches, method.pairs_answered);
             if method.method != Method::PlainHulls {

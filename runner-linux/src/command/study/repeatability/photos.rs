@@ -102,22 +102,31 @@ fn fundamental(first: &Known, second: &Known, scales: [f64; 2]) -> Matrix {
     times(&transposed(&two), &times(&matrix, &one))
 }
 
-/// Pairs of the set with known cameras, whose numbers differ by `step`.
-///
-/// # Errors
-/// A file that cannot be read.
-pub(super) fn with_cameras(folder: &Path, step: usize, count: usize) -> Result<Vec<Pair>, CommandError> {
-    let folder = folder.join("reconstruction/Herz-Jesus-P8");
-    let mut pairs = Vec::new();
-    for number in 0..PICTURES - step {
-        let [(first, a), (second, b)] = both([number, number + step].map(|number| {
+/// The photographs with known cameras, in the order in which they were taken.
+pub(super) struct WithCameras(Vec<(Photo, Known)>);
+
+impl WithCameras {
+    /// Reads them.
+    ///
+    /// # Errors
+    /// A file that cannot be read.
+    pub(super) fn read(folder: &Path, count: usize) -> Result<Self, CommandError> {
+        let folder = folder.join("reconstruction/Herz-Jesus-P8");
+        let read = |number: usize| {
             let name = format!("{number:04}.jpg");
             let known = Known::read(&folder.join("gt").join(format!("{name}.camera")))?;
-            Ok::<_, CommandError>((photo(&folder.join(name), count)?, known))
-        }))?;
-        pairs.push(pair(&first, &second, Truth::Epipolar(fundamental(&a, &b, [first.scale, second.scale]))));
+            Ok((photo(&folder.join(name), count)?, known))
+        };
+        (0..PICTURES).map(read).collect::<Result<_, _>>().map(Self)
     }
-    Ok(pairs)
+
+    /// The pairs whose numbers differ by `step`.
+    pub(super) fn pairs(&self, step: usize) -> Vec<Pair> {
+        let of = |((first, a), (second, b)): (&(Photo, Known), &(Photo, Known))| {
+            pair(first, second, Truth::Epipolar(fundamental(a, b, [first.scale, second.scale])))
+        };
+        self.0.iter().zip(self.0.iter().skip(step)).map(of).collect()
+    }
 }
 
 fn both<T>(results: [Result<T, CommandError>; 2]) -> Result<[T; 2], CommandError> {
