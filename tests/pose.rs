@@ -1,7 +1,7 @@
 //! The camera's pose from corners with known places: exact ones, noisy ones, wrong ones, and too little of them.
 
-use daymark_core::camera::pose::{NoPose, PointInView, Pose, PoseSettings, PoseSolver};
 use daymark_core::camera::Intrinsics;
+use daymark_core::camera::pose::{NoPose, PointInView, Pose, PoseSettings, PoseSolver};
 use daymark_fixtures::distort::Distortion;
 use daymark_fixtures::{Camera, Clutter, Lens, Scene, SeenCorner, Site, Stand, Tower, corners_of};
 
@@ -110,4 +110,17 @@ fn wrong_correspondences_are_left_out_and_the_covariance_is_true() {
     assert!(answers >= 392, "{answers} of 400 have a pose");
     assert!(median < 0.005, "median error {median} of the range");
     assert!((0.90..0.985).contains(&share), "{share} of the truths in the 95 % ellipsoid");
+}
+
+/// The same bits on every machine: a pose that was drawn, with its covariance, as one number.
+#[test]
+fn these_are_the_bits() {
+    let (_, mut points) = view(5, 17.0, 1.1, 60);
+    spoil(&mut points, 0.5, 18, &mut Distortion::new(4));
+    let pose = solve(&points).expect("a pose");
+    let numbers = pose.camera_from_model.rotation().as_flattened().iter().chain(pose.covariance.as_flattened());
+    let hash = numbers.fold(0xcbf2_9ce4_8422_2325_u64, |hash, number| {
+        (hash ^ number.to_bits()).wrapping_mul(0x0100_0000_01b3).rotate_left(23)
+    });
+    assert_eq!((pose.inliers, format!("{hash:016x}")), (42, String::from("8094d3adbc9fd654")));
 }

@@ -1,8 +1,8 @@
 //! Corners from which no pose follows, or two do: each an honest answer or a refusal with its reason.
 
+use daymark_core::camera::Intrinsics;
 use daymark_core::camera::facade::{Facade, NoFacade};
 use daymark_core::camera::pose::{NoPose, PointInView, Pose, PoseSettings, PoseSolver};
-use daymark_core::camera::Intrinsics;
 use daymark_core::family::{Correspondence, Family, Perspective};
 use daymark_fixtures::distort::Distortion;
 use daymark_fixtures::{Camera, Lens, Vec3};
@@ -163,7 +163,10 @@ fn chance_makes_no_pose() {
         let count = 4 + case % 60;
         let mut at = |scale: f64| scale * (random.unit() - 0.5);
         let points: Vec<_> = (0..count)
-            .map(|_| PointInView { model: [at(20.0), at(20.0), at(30.0)], image: [320.0 + at(300.0), 240.0 + at(400.0)] })
+            .map(|_| PointInView {
+                model: [at(20.0), at(20.0), at(30.0)],
+                image: [320.0 + at(300.0), 240.0 + at(400.0)],
+            })
             .collect();
         assert!(solve(&points, &SETTINGS).is_err(), "case {case}");
     }
@@ -171,7 +174,8 @@ fn chance_makes_no_pose() {
 
 #[test]
 fn weak_perspective_says_when_it_is_out_of_its_range() {
-    let tower: Vec<_> = (0..24).map(|n| [f64::from(n % 3) * 5.0, f64::from(n / 3 % 2) * 10.0, f64::from(n / 6) * 8.0]).collect();
+    let tower: Vec<_> =
+        (0..24).map(|n| [f64::from(n % 3) * 5.0, f64::from(n / 3 % 2) * 10.0, f64::from(n / 6) * 8.0]).collect();
     let near = solve(&see(&camera([5.0, -25.0, 1.7], [5.0, 0.0, 12.0]), &tower), &SETTINGS).expect("near");
     let too_deep = near.weak_perspective.expect_err("a deep tower from near");
     assert!(too_deep.error_px > 20.0, "{too_deep}");

@@ -34,8 +34,7 @@ fn the_local_frame_is_that_of_a_geodesy_crate() {
         for _ in 0..200 {
             let local = [20e3 * random.unit() - 10e3, 20e3 * random.unit() - 10e3, 1e3 * random.unit()];
             let found = frame.wgs84_from_local(local);
-            let (lat, lon, alt) =
-                enu2geodetic(local[0], local[1], local[2], lat0, lon0, origin[2], Ellipsoid::WGS84);
+            let (lat, lon, alt) = enu2geodetic(local[0], local[1], local[2], lat0, lon0, origin[2], Ellipsoid::WGS84);
             // A hundred millionth of a degree is a millimetre.
             assert!((found.latitude_deg - lat.to_degrees()).abs() < 1e-9, "{found:?} {}", lat.to_degrees());
             let turn = (found.longitude_deg - lon.to_degrees()).abs();
@@ -292,7 +291,9 @@ fn what_was_known_before_chooses_and_refuses() {
     let compass = Prior { near: None, heading_deg: Some(Measured { value: 358.0, deviation: 5.0 }) };
     let heading = |value| Fix { heading_deg: Some(Measured { value, deviation: 1.0 }), ..here };
     assert!(compass.check(&heading(4.0)).is_ok());
-    assert!(matches!(compass.check(&heading(178.0)), Err(Contradiction::Heading { apart_deg }) if (apart_deg - 180.0).abs() < 1e-9));
+    assert!(
+        matches!(compass.check(&heading(178.0)), Err(Contradiction::Heading { apart_deg }) if (apart_deg - 180.0).abs() < 1e-9)
+    );
 }
 
 /// A building alone: the observer within its reach, and the radius says so.

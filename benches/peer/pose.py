@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """Poses of real photographs: daymark's pose step beside OpenCV's solvePnPRansac, on the same correspondences.
 
-A folder of photographs with known cameras (Strecha's `.camera` files in `gt/`). Each photograph is left out in turn: SIFT
+A folder of photographs with known cameras in `gt/`: Strecha's `.camera` files, or COLMAP's `cameras.txt` and `images.txt`
+(`SIMPLE_RADIAL`; features are freed of the distortion). Each photograph is left out in turn: SIFT
 features of the others are matched and triangulated with their known cameras, the left-out photograph's features are matched with
 those points (ratio test 0.8), and both programs find its pose from these 2D-3D correspondences, wrong ones among them. Printed
 are the error of the camera's centre, as a share of the distance to the points, and of its rotation.
@@ -28,15 +29,39 @@ MOST = 2000
 DEVIATION_PX = 1.0
 
 
-def camera(path, scale):
+def colmap(folder):
+    """Size, lens and place by name."""
+    rows = lambda name: [line.split() for line in (folder / name).read_text().splitlines() if line and line[0] != "#"]
+    lenses = {row[0]: row[1:] for row in rows("cameras.txt")}
+    views = {}
+    for row in rows("images.txt")[::2]:
+        kind, width, height, focal, x, y, radial = lenses[row[8]]
+        if kind != "SIMPLE_RADIAL":
+            raise SystemExit(f"{folder}: {kind} is not read, only SIMPLE_RADIAL")
+        w, *v = (float(word) for word in row[1:5])
+        v = np.array(v)
+        across = np.array([[0, -v[2], v[1]], [v[2], 0, -v[0]], [-v[1], v[0], 0]])
+        rotation = (w * w - v @ v) * np.eye(3) + 2 * np.outer(v, v) + 2 * w * across
+        step = np.array([float(word) for word in row[5:8]])
+        # COLMAP puts the centre of the first pixel at (0.5, 0.5).
+        matrix = np.array([[float(focal), 0, float(x) - 0.5], [0, float(focal), float(y) - 0.5], [0, 0, 1]])
+        views[row[9]] = (float(width), matrix, rotation, -rotation.T @ step, float(radial))
+    return views
+
+
+def scaled(matrix, scale):
+    """The picture is scaled by areas of pixels: the centre of the first pixel moves."""
+    matrix = matrix.copy()
+    matrix[:2] *= scale
+    matrix[:2, 2] += 0.5 * scale - 0.5
+    return matrix
+
+
+def strecha(path):
     numbers = [float(word) for word in path.read_text().split()]
     matrix = np.array(numbers[:9]).reshape(3, 3)
-    # The picture is scaled by areas of pixels: the centre of the first pixel moves.
-    matrix[0] *= scale
-    matrix[1] *= scale
-    matrix[:2, 2] += 0.5 * scale - 0.5
     rotation = np.array(numbers[12:21]).reshape(3, 3).T
-    return matrix, rotation, np.array(numbers[21:24])
+    return numbers[24], matrix, rotation, np.array(numbers[21:24]), 0.0
 
 
 def matched(one, two):
@@ -128,14 +153,24 @@ def main():
     cv2.setNumThreads(1)
     sift = cv2.SIFT_create(FEATURES)
     views, features, size = [], [], None
-    for path in sorted(options.photos.glob("*.jpg")):
+    known = {}
+    for list_file in options.photos.glob("gt/**/images.txt"):
+        known.update(colmap(list_file.parent))
+    for path in options.photos.glob("gt/*.camera"):
+        known[path.stem] = strecha(path)
+    for name in sorted(known):
+        path = options.photos / name
+        said_width, matrix, rotation, centre, radial = known[name]
         picture = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
         scale = options.width / picture.shape[1]
         picture = cv2.resize(picture, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
         size = picture.shape[::-1]
-        views.append(camera(options.photos / "gt" / (path.name + ".camera"), scale))
+        views.append((scaled(matrix, options.width / said_width), rotation, centre))
         keypoints, descriptors = sift.detectAndCompute(picture, None)
-        features.append((np.array([point.pt for point in keypoints]), descriptors))
+        seen = np.array([point.pt for point in keypoints])
+        lens = views[-1][0]
+        seen = cv2.undistortPoints(seen[:, None], lens, np.array([radial, 0, 0, 0]), P=lens)[:, 0]
+        features.append((seen, descriptors))
     pairs = {(i, j): matched(features[i][1], features[j][1]) for i, j in itertools.combinations(range(len(views)), 2)}
 
     print(f"{'photo':>5} {'pairs':>6} {'program':>8} {'inliers':>8} {'centre, %':>10} {'rotation, deg':>14} {'us':>9}")
@@ -155,7 +190,7 @@ def main():
                 continue
             found, at, inliers, micros = answer
             off = np.linalg.norm(at - centre) / far
-            turn = np.degrees(np.arccos(np.clip((np.trace(found @ rotation.T) - 1) / 2, -1, 1)))
+            turn = np.degrees(2 * np.arcsin(np.linalg.norm(found - rotation) / np.sqrt(8)))
             errors[program].append((off, turn))
             print(f"{left_out:5} {len(model):6} {program:>8} {inliers:8} {100 * off:10.4f} {turn:14.4f} {micros:9.0f}")
     for program, all_errors in errors.items():

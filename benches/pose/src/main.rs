@@ -34,7 +34,10 @@ fn times() -> io::Result<()> {
     let lens = Intrinsics::centred(Lens::VGA.focal, 640, 480).expect("a lens");
     let settings = PoseSettings::of_frame(640, 480);
     let mut out = io::stdout().lock();
-    writeln!(out, "{COUNT} correspondences, 0.5 px noise; the least of {ROUNDS} rounds for each of {CASES} views of towers")?;
+    writeln!(
+        out,
+        "{COUNT} correspondences, 0.5 px noise; the least of {ROUNDS} rounds for each of {CASES} views of towers"
+    )?;
     writeln!(out, "{:>8} {:>10} {:>10} {:>10} {:>8}", "wrong, %", "least, us", "median, us", "most, us", "poses")?;
     for wrong in [0, 6, 12, 18, 24] {
         let mut solver = PoseSolver::<64>::new();

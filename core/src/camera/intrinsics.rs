@@ -22,7 +22,10 @@ pub struct NoCamera {
 impl fmt::Display for NoCamera {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let ([fx, fy], [cx, cy]) = (self.focal, self.centre);
-        write!(f, "no camera has fx = {fx} px, fy = {fy} px, cx = {cx} px, cy = {cy} px: focal lengths are positive and finite")
+        write!(
+            f,
+            "no camera has fx = {fx} px, fy = {fy} px, cx = {cx} px, cy = {cy} px: focal lengths are positive and finite"
+        )
     }
 }
 
@@ -64,9 +67,7 @@ impl Intrinsics {
 
     /// Where a point of the camera frame is seen; `None` if it is not in front.
     pub fn project(&self, [x, y, depth]: [f64; 3]) -> Option<[f64; 2]> {
-        (depth > 0.0).then(|| {
-            [self.focal[0] * x / depth + self.centre[0], self.focal[1] * y / depth + self.centre[1]]
-        })
+        (depth > 0.0).then(|| [self.focal[0] * x / depth + self.centre[0], self.focal[1] * y / depth + self.centre[1]])
     }
 
     /// The direction of what is seen at an image point: (x/z, y/z).

@@ -191,10 +191,16 @@ impl fmt::Display for NoPose {
             Self::NotFinite => f.write_str("a coordinate or a setting is not a finite number in its range"),
             Self::Collinear => f.write_str("the corners lie on a line: the camera could be anywhere around it"),
             Self::EdgeOn { across_px } => {
-                write!(f, "the corners are seen edge-on, {across_px:.1} px thin: look at the building from another side")
+                write!(
+                    f,
+                    "the corners are seen edge-on, {across_px:.1} px thin: look at the building from another side"
+                )
             }
             Self::NoConsensus { inliers, points } => {
-                write!(f, "only {inliers} of {points} corners fit one position: another building, or too many wrong matches")
+                write!(
+                    f,
+                    "only {inliers} of {points} corners fit one position: another building, or too many wrong matches"
+                )
             }
             Self::OnePlane { inliers, off_plane } => write!(
                 f,
@@ -205,7 +211,10 @@ impl fmt::Display for NoPose {
             }
             Self::Mirrored => f.write_str("the facade is seen from behind: a mirror image"),
             Self::Undetermined { deviation_m } => {
-                write!(f, "the corners leave the position open, by {deviation_m:.1} m: more of the building must be seen")
+                write!(
+                    f,
+                    "the corners leave the position open, by {deviation_m:.1} m: more of the building must be seen"
+                )
             }
         }
     }
@@ -268,7 +277,10 @@ impl<const POINTS: usize> PoseSolver<POINTS> {
         let [width, height] = settings.frame_px;
         let usable = |number: f64| number > 0.0 && number.is_finite();
         let image = points.iter().all(|point| point.image.iter().all(|x| x.is_finite()));
-        if !image || !dot(centroid, centroid).is_finite() || ![settings.deviation_px, width, height].into_iter().all(usable) {
+        if !image
+            || !dot(centroid, centroid).is_finite()
+            || ![settings.deviation_px, width, height].into_iter().all(usable)
+        {
             return Err(NoPose::NotFinite);
         }
         self.sights.clear();

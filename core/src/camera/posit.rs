@@ -1,7 +1,7 @@
 //! Pose from scaled orthography, and from scaled orthography with its error taken out again and again: POSIT.
 //!
 //! Weak perspective sees a model point M at `x = I . M + x0`, `y = J . M + y0` with `I = R1 / Z`, `J = R2 / Z`: linear. Full
-//! perspective is the same with `x (1 + e)`, `e = (R3 . M) / Z`, in place of `x` (D. DeMenthon, L. Davis, *Model-based object
+//! perspective is the same with `x (1 + e)`, `e = (R3 . M) / Z`, in place of `x` (D. `DeMenthon`, L. Davis, *Model-based object
 //! pose in 25 lines of code*, IJCV 15, 1995, doi:10.1007/BF01450852), so solving, taking `e` from the solution and solving again
 //! converges for objects that are not much deeper than far. A flat model leaves the parts of I and J along its normal open;
 //! that R1 and R2 are orthogonal and of equal length gives them in two ways (D. Oberkampf et al., *Iterative pose estimation
@@ -55,7 +55,7 @@ impl Orthography {
         let modulus = sqrt_f64(real * real + imaginary * imaginary);
         // The larger part of the root first: the other follows by a division that loses nothing.
         if real >= 0.0 {
-            let l = sqrt_f64((modulus + real) / 2.0);
+            let l = sqrt_f64(f64::midpoint(modulus, real));
             [l, if l > 0.0 { imaginary / (2.0 * l) } else { 0.0 }]
         } else {
             let m = sqrt_f64((modulus - real) / 2.0);
@@ -170,9 +170,7 @@ pub(super) fn of_three([first, second, third]: [Sight; 3]) -> [Option<CameraFrom
     // The dual basis: `dual_a . a = 1`, `dual_a . b = 0`.
     let (dual_a, dual_b) = (scaled(cross(b, across), 1.0 / square), scaled(cross(across, a), 1.0 / square));
     let orthography = |ratio_a: f64, ratio_b: f64| {
-        let part = |at: f64, a: f64, b: f64| {
-            plus(scaled(dual_a, a * ratio_a - at), scaled(dual_b, b * ratio_b - at))
-        };
+        let part = |at: f64, a: f64, b: f64| plus(scaled(dual_a, a * ratio_a - at), scaled(dual_b, b * ratio_b - at));
         let ([x, y], [xa, ya], [xb, yb]) = (first.ray, second.ray, third.ray);
         Orthography { right: part(x, xa, xb), down: part(y, ya, yb), at: first.ray }
     };

@@ -62,15 +62,15 @@ impl<'a> Question<'a> {
     pub(super) fn answer(mut self, model: &Axes, centroid: Vector) -> Result<Pose, NoPose> {
         let flatness = sqrt_f64(model.values[2] / model.values[1]);
         let shape = Shape { sights: self.problem.sights, axes: model };
-        let settled = self.from_all(shape, flatness).or_else(|| self.from_draws());
+        let settled = self.by_all(shape, flatness).or_else(|| self.by_draws());
         let points = self.problem.sights.len();
         let Some(settled) = settled.filter(|settled| self.stands(settled)) else {
             let inliers = settled.map_or(0, |settled| settled.inside);
             // Does it fit from behind?
             let behind = self.front.take().is_some()
                 && self
-                    .from_all(shape, flatness)
-                    .or_else(|| self.from_draws())
+                    .by_all(shape, flatness)
+                    .or_else(|| self.by_draws())
                     .is_some_and(|other| self.stands(&other));
             return Err(if behind { NoPose::Mirrored } else { NoPose::NoConsensus { inliers, points } });
         };
@@ -113,7 +113,7 @@ impl<'a> Question<'a> {
     }
 
     /// POSIT from all points, if nearly all of them agree.
-    fn from_all(&self, shape: Shape<'_>, flatness: f64) -> Option<Settled> {
+    fn by_all(&self, shape: Shape<'_>, flatness: f64) -> Option<Settled> {
         let solid = if flatness > FLAT { shape.solid() } else { None };
         let flat = if flatness < RATHER_FLAT { shape.flat() } else { [None; 2] };
         let wide = SOFT_GATES[0] * self.settings.deviation_px;
@@ -132,7 +132,7 @@ impl<'a> Question<'a> {
         best.filter(|best| best.inside as f64 >= enough)
     }
 
-    fn from_draws(&self) -> Option<Settled> {
+    fn by_draws(&self) -> Option<Settled> {
         let gate = DRAW_GATE * self.settings.deviation_px;
         let start = draw::of_most(&self.problem, gate * gate, |pose| self.in_front(pose))?;
         self.settle(start)

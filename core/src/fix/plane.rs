@@ -23,7 +23,6 @@ pub(super) fn difference_deg(one: f64, two: f64) -> f64 {
 
 pub(super) type Matrix2 = [[f64; 2]; 2];
 
-
 /// `None` if it is singular up to rounding.
 pub(super) fn inverse([[a, b], [c, d]]: Matrix2) -> Option<Matrix2> {
     let determinant = a * d - b * c;

@@ -1,8 +1,8 @@
 //! What is known before the frame: where the observer was last, and what a compass says.
 
+use super::ellipse::DEVIATIONS_95;
 use super::geodesy::{LocalFrame, Wgs84};
 use super::plane::{difference_deg, mahalanobis};
-use super::ellipse::DEVIATIONS_95;
 use super::{Fix, Measured};
 
 /// 99.9 % of chi-square with two degrees of freedom.

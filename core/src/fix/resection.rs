@@ -76,7 +76,9 @@ impl core::fmt::Display for NoResection {
         match self {
             Self::TooFew { equations } => write!(f, "{equations} directions and ranges are known, a place needs three"),
             Self::TooMany { found } => write!(f, "{found} landmarks, there is room for {MOST_LANDMARKS}"),
-            Self::Undetermined => f.write_str("the landmarks stand so that the place is open: on a line, or on a circle"),
+            Self::Undetermined => {
+                f.write_str("the landmarks stand so that the place is open: on a line, or on a circle")
+            }
             Self::Ambiguous { apart_m } => write!(f, "a second place fits as well, {apart_m:.0} m away"),
             Self::Contradiction { chi_square } => write!(f, "the directions contradict each other ({chi_square:.1})"),
             Self::NotFinite => f.write_str("a number is not finite, or a deviation not positive"),
@@ -121,9 +123,13 @@ pub fn resect(sightings: &[Sighting], prior: &Prior) -> Result<Resection, NoRese
     if sightings.len() > MOST_LANDMARKS {
         return Err(NoResection::TooMany { found: sightings.len() });
     }
-    let positive = |measured: Measured| measured.value.is_finite() && measured.deviation > 0.0 && measured.deviation.is_finite();
+    let positive =
+        |measured: Measured| measured.value.is_finite() && measured.deviation > 0.0 && measured.deviation.is_finite();
     let sound = sightings.iter().all(|one| {
-        positive(one.from_axis_deg) && one.range_m.is_none_or(positive) && one.deviation_m >= 0.0 && one.deviation_m.is_finite()
+        positive(one.from_axis_deg)
+            && one.range_m.is_none_or(positive)
+            && one.deviation_m >= 0.0
+            && one.deviation_m.is_finite()
     });
     if !sound {
         return Err(NoResection::NotFinite);

@@ -3,10 +3,10 @@
 use super::geodesy::{LocalFrame, Wgs84};
 use super::plane::{DEGREE, azimuth_deg};
 use super::{Evidence, Fix, Measured};
+use crate::camera::CameraFromModel;
 use crate::camera::direction::Direction;
 use crate::camera::pose::Pose;
 use crate::camera::space::{Matrix, Vector, apply, cross, dot, minus, product, scaled, transposed};
-use crate::camera::CameraFromModel;
 use crate::math::{sin_cos, sqrt_f64};
 
 /// Where a model stands: its origin and the azimuth of its +y axis, which points into the building from its front.

@@ -80,7 +80,8 @@ impl Track {
         if chi_square <= GATE {
             self.state = Some(merged);
             // Every fix that agrees with the track speaks against the challenger.
-            self.challenger = self.challenger.filter(|one| one.fixes > 1).map(|one| State { fixes: one.fixes - 1, ..one });
+            self.challenger =
+                self.challenger.filter(|one| one.fixes > 1).map(|one| State { fixes: one.fixes - 1, ..one });
             return Update::Taken { chi_square };
         }
         let challenger = self.challenger.map(|challenger| self.later(challenger, time_s));

@@ -13,6 +13,8 @@ const FOOT: f64 = 64.0;
 const BAR_SHARE: f64 = 0.3;
 /// A plan shows at least so many metres.
 const LEAST_METRES: f64 = 40.0;
+/// If the largest ellipse has a half axis of fewer pixels, all are drawn so many times as large.
+const SMALL: [(f64, f64); 2] = [(0.6, 100.0), (6.0, 10.0)];
 /// Half the angle of the wedge that shows where the camera points, degrees.
 const WEDGE: f64 = 15.0;
 
@@ -56,6 +58,8 @@ struct Scale {
     /// Of the upper left corner: east, north.
     corner: [f64; 2],
     pixels_a_metre: f64,
+    /// How many times as large ellipses are drawn.
+    ellipses: f64,
 }
 
 impl Scale {
@@ -134,18 +138,20 @@ impl Plan {
             }
         }
         let side = (high[0] - low[0]).max(high[1] - low[1]).max(LEAST_METRES);
-        let middle = [(low[0] + high[0]) / 2.0, (low[1] + high[1]) / 2.0];
-        side.is_finite().then(|| Scale {
-            frame,
-            corner: [middle[0] - side / 2.0, middle[1] + side / 2.0],
-            pixels_a_metre: (SIDE - 2.0 * MARGIN) / side,
-        })
+        let middle = [f64::midpoint(low[0], high[0]), f64::midpoint(low[1], high[1])];
+        let pixels_a_metre = (SIDE - 2.0 * MARGIN) / side;
+        let ellipses = self.observers.iter().map(|observer| observer.fix.ellipse().semi_major_m * pixels_a_metre);
+        let largest = ellipses.fold(0.0, f64::max);
+        let ellipses = SMALL.iter().find(|(pixels, _)| largest < *pixels).map_or(1.0, |(_, factor)| *factor);
+        let corner = [middle[0] - side / 2.0, middle[1] + side / 2.0];
+        side.is_finite().then_some(Scale { frame, corner, pixels_a_metre, ellipses })
     }
 
     fn observer(&self, observer: &Observer, scale: &Scale) -> Group {
         let fix = &observer.fix;
         let [x, y] = scale.at(fix.position);
         let ellipse = fix.ellipse();
+        let pixels = scale.pixels_a_metre * scale.ellipses;
         let mut group = Group::new().set("class", "observer");
         if let Some(building) = observer.sees.and_then(|number| self.buildings.get(number)) {
             let [to_x, to_y] = scale.at(building.position);
@@ -160,8 +166,8 @@ impl Plan {
                 Ellipse::new()
                     .set("cx", number(x))
                     .set("cy", number(y))
-                    .set("rx", number(ellipse.semi_minor_m * scale.pixels_a_metre))
-                    .set("ry", number(ellipse.semi_major_m * scale.pixels_a_metre))
+                    .set("rx", number(ellipse.semi_minor_m * pixels))
+                    .set("ry", number(ellipse.semi_major_m * pixels))
                     .set("transform", format!("rotate({:.1} {x:.1} {y:.1})", ellipse.orientation_deg))
                     .set("fill", "#2f6fdb")
                     .set("fill-opacity", 0.15)
@@ -232,7 +238,10 @@ fn north() -> Group {
         .set("class", "north")
         .add(
             Path::new()
-                .set("d", format!("M{x} {} L{} {} L{x} {} L{} {} Z", y - 22.0, x + 8.0, y + 8.0, y + 2.0, x - 8.0, y + 8.0))
+                .set(
+                    "d",
+                    format!("M{x} {} L{} {} L{x} {} L{} {} Z", y - 22.0, x + 8.0, y + 8.0, y + 2.0, x - 8.0, y + 8.0),
+                )
                 .set("fill", "#18202c"),
         )
         .add(text("N", [x, y + 24.0], 13.0, "middle").set("font-weight", 600))
@@ -256,13 +265,16 @@ fn bar(scale: &Scale) -> Group {
     let (left, y) = (MARGIN, SIDE + FOOT - 30.0);
     let right = left + metres * scale.pixels_a_metre;
     let name = if metres >= 1_000.0 { format!("{} km", metres / 1_000.0) } else { format!("{metres} m") };
+    let enlarged =
+        if scale.ellipses > 1.0 { format!(", drawn {} times as large", scale.ellipses) } else { String::new() };
+    let legend = format!("ellipses hold the truth with 95 %{enlarged}");
     Group::new()
         .set("class", "scale")
         .add(line([left, y], [right, y], "#18202c", 3.0))
         .add(line([left, y - 5.0], [left, y + 5.0], "#18202c", 1.5))
         .add(line([right, y - 5.0], [right, y + 5.0], "#18202c", 1.5))
         .add(text(&name, [right + 8.0, y + 4.0], 12.0, "start"))
-        .add(text("ellipses hold the truth with 95 %", [SIDE - MARGIN / 2.0, y + 4.0], 12.0, "end"))
+        .add(text(&legend, [SIDE - MARGIN / 2.0, y + 4.0], 12.0, "end"))
 }
 
 #[cfg(test)]
@@ -277,7 +289,10 @@ mod tests {
 
     #[test]
     fn bars_are_round() {
-        assert_eq!([40.0, 100.0, 260.0, 5_000.0].map(bar_metres).map(|metres| metres.round()), [10.0, 20.0, 50.0, 1_000.0]);
+        assert_eq!(
+            [40.0, 100.0, 260.0, 5_000.0].map(bar_metres).map(|metres| metres.round()),
+            [10.0, 20.0, 50.0, 1_000.0]
+        );
     }
 
     #[test]

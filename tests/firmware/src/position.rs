@@ -2,9 +2,9 @@
 
 use core::hint::black_box;
 
+use daymark_core::camera::Intrinsics;
 use daymark_core::camera::facade::Facade;
 use daymark_core::camera::pose::{PointInView, PoseSettings, PoseSolver};
-use daymark_core::camera::Intrinsics;
 use daymark_core::fix::agreement::combine;
 use daymark_core::fix::prior::Near;
 use daymark_core::fix::resection::{Sighting, resect};
@@ -25,7 +25,8 @@ pub fn check(device: &mut Device) -> bool {
     let settings = PoseSettings::of_frame(320, 240);
     let mut made = [PointInView { model: [0.0; 3], image: [0.0; 2] }; POINTS];
     let mut by_chance = made;
-    for (number, ((made, chance), at)) in made.iter_mut().zip(&mut by_chance).zip(pixels.as_chunks::<8>().0).enumerate() {
+    for (number, ((made, chance), at)) in made.iter_mut().zip(&mut by_chance).zip(pixels.as_chunks::<8>().0).enumerate()
+    {
         let [a, b, c, d, e, ..] = at.map(f64::from);
         let column = (number % 4) as f64;
         let row = (number / 4) as f64;
@@ -68,6 +69,9 @@ fn fixes(site: &Site, fix: &Fix) {
         near: Some(Near { position: site.position, radius_m: 200.0 }),
         heading_deg: Some(Measured { value: black_box(10.0), deviation: 5.0 }),
     };
-    let _ = black_box((prior.check(fix), resect(black_box(&[seen(-40.0, -20.0), seen(0.0, 3.0), seen(60.0, 30.0)]), &prior)));
+    let _ = black_box((
+        prior.check(fix),
+        resect(black_box(&[seen(-40.0, -20.0), seen(0.0, 3.0), seen(60.0, 30.0)]), &prior),
+    ));
     black_box(site.point_in(&frame, [1.0, 2.0, 3.0]));
 }

@@ -7,9 +7,9 @@ mod score;
 mod show;
 mod walk;
 
-use std::fs;
+use std::fs::File;
 use std::io::{self, Write};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use daymark_fixtures::Scene;
 use rayon::prelude::*;
@@ -98,6 +98,9 @@ struct Line {
 }
 
 pub(super) fn run(args: &Args) -> Result<Outcome, CommandError> {
+    // Before the work, so that a wrong path costs nobody's time.
+    let mut plot = args.plot.as_deref().map(Drawing::create).transpose()?;
+    let mut map = args.map.as_deref().map(Drawing::create).transpose()?;
     let scene = Scene::town();
     let count = args.poses as usize;
     let stops: Vec<Stop> = (0..count).into_par_iter().map(|number| stop(&scene, number, count, args.seed)).collect();
@@ -125,19 +128,33 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CommandError> {
         by_wrong: WRONG.map(|wrong| line(args.noise_px, wrong)).into(),
         wrong_buildings: score::wrong_buildings(&stops, &scene, asked, args.seed),
     };
-    if let Some(path) = &args.plot {
-        write(path, &show::plot(&cases, &report))?;
+    if let Some(plot) = &mut plot {
+        plot.write(&show::plot(&cases, &report))?;
     }
-    if let Some(path) = &args.map {
-        write(path, &show::map(&scene, &stops, &cases))?;
+    if let Some(map) = &mut map {
+        map.write(&show::map(&scene, &stops, &cases))?;
     }
     let text = if args.json { serde_json::to_string_pretty(&report)? + "\n" } else { show::table(&report) };
     io::stdout().write_all(text.as_bytes())?;
     Ok(Outcome::Done)
 }
 
-fn write(path: &PathBuf, svg: &str) -> Result<(), CommandError> {
-    fs::write(path, svg).map_err(|error| format!("{}: cannot be written: {error}", path.display()).into())
+/// A file that a drawing goes to.
+struct Drawing<'a> {
+    path: &'a Path,
+    file: File,
+}
+
+impl<'a> Drawing<'a> {
+    fn create(path: &'a Path) -> Result<Self, CommandError> {
+        let file = File::create(path).map_err(|error| format!("{}: cannot be written: {error}", path.display()))?;
+        Ok(Self { path, file })
+    }
+
+    fn write(&mut self, svg: &str) -> Result<(), CommandError> {
+        let written = self.file.write_all(svg.as_bytes());
+        written.map_err(|error| format!("{}: cannot be written: {error}", self.path.display()).into())
+    }
 }
 
 impl Case {

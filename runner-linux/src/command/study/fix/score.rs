@@ -155,7 +155,9 @@ impl Answer {
             error_m: libm::hypot(e, n),
             altitude_error_m: (up - truth.z).abs(),
             bearing_error_deg: turn(bearing, azimuth(to_east, to_north)),
-            heading_error_deg: fix.heading_deg.map_or(180.0, |heading| turn(heading.value, azimuth(forward.x, forward.y))),
+            heading_error_deg: fix
+                .heading_deg
+                .map_or(180.0, |heading| turn(heading.value, azimuth(forward.x, forward.y))),
             inside: square <= CHI_SQUARE_95,
             radius_m: fix.ellipse().radius(),
             fix,
@@ -175,7 +177,8 @@ impl Figures {
     pub(super) fn of<'a>(cases: impl Iterator<Item = &'a Case>) -> Self {
         let cases: Vec<_> = cases.collect();
         // A fix that leaves two sides open is none.
-        let answers: Vec<_> = cases.iter().filter_map(|case| case.answer.as_ref()).filter(|answer| !answer.open).collect();
+        let answers: Vec<_> =
+            cases.iter().filter_map(|case| case.answer.as_ref()).filter(|answer| !answer.open).collect();
         let all = |of: fn(&Answer) -> f64, share| quantile(answers.iter().map(|answer| of(answer)).collect(), share);
         let share = |count: usize, of: usize| count as f64 / of.max(1) as f64;
         Self {

@@ -17,7 +17,8 @@ const DRAWN: usize = 5;
 const PLOT_END: f64 = 0.02;
 
 pub(super) fn table(report: &Report) -> String {
-    let Report { frame_px: [width, height], focal_length_px, poses, corners_at_most, noise_px, wrong_share, .. } = report;
+    let Report { frame_px: [width, height], focal_length_px, poses, corners_at_most, noise_px, wrong_share, .. } =
+        report;
     let mut text = format!(
         "{poses} poses on a loop among the eight towers; {width} x {height} px, focal length {focal_length_px} px; up to \
          {corners_at_most} corners, {noise_px} px noise, {:.0} % wrong\n\n",

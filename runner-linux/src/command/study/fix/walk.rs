@@ -172,7 +172,7 @@ pub(super) fn by_place(stop: &Stop, scene: &Scene, other: &[Corner], reach_px: f
         let nearest = stop.seen.iter().min_by(|a, b| square(a).total_cmp(&square(b)))?;
         let model = corner.model;
         (square(&nearest) < reach_px * reach_px)
-            .then(|| PointInView { model: [model.x, model.y, model.z], image: [nearest.image.x, nearest.image.y] })
+            .then_some(PointInView { model: [model.x, model.y, model.z], image: [nearest.image.x, nearest.image.y] })
     };
     other.iter().step_by(step).filter_map(pair).take(most).collect()
 }
