@@ -5,6 +5,8 @@
 //!  picture ─── enroll ─────── table_file        pictures become views of a table
 //!  picture ─── engine ─────── report            frames become answers, and answers text, JSON and drawings
 //!  dataset ─── command::evaluate                how often that is right
+//!  camera_file ─ synthesize ─ model_file        pictures and cameras become textured models, and models files
+//!                    └─────── classify          which of several models a model is
 //! ```
 
 pub mod picture;
