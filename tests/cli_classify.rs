@@ -15,7 +15,7 @@ fn model(number: usize, angles: &[f64], light: Light, around: bool) -> Vec<u8> {
     let conditions = Conditions { light, seed: 70 + number as u64 + u64::from(around), farther: 1.0 };
     let views = TowerViews::new(tower, angles, &conditions, around);
     let model = views.model(0.5, number as u64);
-    let dense = model.dense(SubdivisionLevel::TWO, views.views(), views.stations()).expect("a surface");
+    let dense = model.dense(SubdivisionLevel::THREE, views.views(), views.stations()).expect("a surface");
     ply::file(&dense, &[])
 }
 
@@ -64,7 +64,7 @@ fn models_that_are_none_are_refused() {
 #[test]
 fn the_study_of_the_towers_has_every_row_right() {
     let town = Town::new();
-    let document = town.run(&["study", "towers", "--seeds", "1", "--levels", "2", "--json"]).succeeded().json();
+    let document = town.run(&["study", "towers", "--seeds", "1", "--json"]).succeeded().json();
     assert_eq!(document["rows"].as_array().map(Vec::len), Some(8));
     assert_eq!((&document["right"], &document["refused_when_absent"]), (&8.into(), &8.into()), "{document:#}");
     assert!(document["smallest_margin"].as_f64().unwrap() >= 1.5, "{document:#}");

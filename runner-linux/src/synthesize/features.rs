@@ -20,7 +20,9 @@ const MAX_BITS: u32 = 40;
 /// The best match must have at most this share of the next one's bits, in hundredths.
 const RATIO_PERCENT: u32 = 85;
 /// Along a line there are fewer to be mistaken for.
-const GUIDED_RATIO_PERCENT: u32 = 90;
+const GUIDED_RATIO_PERCENT: u32 = 80;
+/// A line holds dozens of features, and one of them is always on it: signatures must be nearer than elsewhere.
+const MAX_GUIDED_BITS: u32 = 28;
 /// Bits at which a rival is looked at.
 const MAX_RIVAL_BITS: u8 = 48;
 /// What lies this near is the same place, no competitor; pixels.
@@ -120,7 +122,7 @@ pub fn guided_matches(
             });
         });
         candidates.sort_unstable();
-        let Some(&(least, best)) = candidates.first().filter(|(least, _)| u32::from(*least) <= MAX_BITS) else {
+        let Some(&(least, best)) = candidates.first().filter(|(least, _)| u32::from(*least) <= MAX_GUIDED_BITS) else {
             continue;
         };
         let next = candidates.iter().find(|(_, other)| elsewhere(second.points[*other], second.points[best]));
