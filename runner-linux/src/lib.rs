@@ -7,6 +7,8 @@
 //!  picture ─── correspond                       which corner of one picture is which of another
 //!  dataset ─── command::evaluate                how often that is right
 //!  frame ───── watch ──────── output            a camera becomes answers that stand until they are withdrawn
+//!  camera_file ─ synthesize ─ model_file        pictures and cameras become textured models, and models files
+//!                    └─────── classify          which of several models a model is
 //! ```
 
 pub mod picture;

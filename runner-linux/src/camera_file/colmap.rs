@@ -244,7 +244,7 @@ mod tests {
             cameras.extend(p.iter().flat_map(|p: &f64| p.to_le_bytes()));
         }
         let mut images = 2_u64.to_le_bytes().to_vec();
-        let half = 0.707_106_781_186_547_6;
+        let half = std::f64::consts::FRAC_1_SQRT_2;
         for (id, place, camera, name, points) in [
             (1_u32, [1.0, 0.0, 0.0, 0.0, 1.0, 2.0, 3.0], 1_u32, "a b.JPG", 2_u64),
             (2, [half, 0.0, 0.0, half, 0.0, 0.0, 5.0], 2, "c.png", 0),

@@ -66,8 +66,8 @@ mod tests {
         for scale in [1.0, -0.01] {
             let m = k * turn * scale;
             let p = -(m * centre);
-            let text: String =
-                (0..3).map(|r| format!("{} {} {} {}\n", m[(r, 0)], m[(r, 1)], m[(r, 2)], p[r])).collect();
+            let lines = [0, 1, 2].map(|r| format!("{} {} {} {}", m[(r, 0)], m[(r, 1)], m[(r, 2)], p[r]));
+            let text = lines.join("\n");
             let camera = parse(&text).unwrap();
             let pose = camera.pose.unwrap();
             assert!((pose.position - centre).norm() < 1e-9 && (pose.view_from_model - turn).norm() < 1e-9);

@@ -75,8 +75,44 @@ fn best_shift(test: &Cloud, base: &Cloud) -> Similarity {
             refined.push(closest_points(&test.sample(SAMPLE), base, start, ROUNDS, &shifted));
         }
     }
-    refined.sort_by(|a, b| a.1.total_cmp(&b.1));
-    refined.first().map_or(Similarity::shift(middle), |best| best.0)
+    let sample = test.sample(SAMPLE);
+    let mut settled: Vec<_> =
+        refined.into_iter().map(|(map, _)| settle(&sample, base, map.translation, (high - low).norm())).collect();
+    settled.sort_by(|a, b| a.1.total_cmp(&b.1));
+    Similarity::shift(settled.first().map_or(middle, |best| best.0))
+}
+
+/// Moves a shift in smaller and smaller steps along the axes while the mean squared distance of all points falls.
+///
+/// Closest points stick: points of a wall hold on to their neighbours one sample further, and the trimmed ones are just
+/// those that know better.
+fn settle(test: &[[f32; 3]], base: &Cloud, start: Vector3<f64>, size: f64) -> (Vector3<f64>, f64) {
+    let error = |shift: &Vector3<f64>| {
+        let map = Similarity::shift(*shift);
+        let moved: Vec<[f32; 3]> = test.iter().map(|&point| map.apply_f32(point)).collect();
+        let nearest = base.tree.nearest_of_each(&moved, &base.positions);
+        nearest.iter().flatten().map(|nearest| f64::from(nearest.squared)).sum::<f64>() / test.len().max(1) as f64
+    };
+    let mut best = (start, error(&start));
+    let mut step = 0.03 * size;
+    while step > 0.0005 * size {
+        let mut lowered = false;
+        for axis in 0..3 {
+            for sign in [-1.0, 1.0] {
+                let mut next = best.0;
+                next[axis] += sign * step;
+                let now = error(&next);
+                if now < best.1 {
+                    best = (next, now);
+                    lowered = true;
+                }
+            }
+        }
+        if !lowered {
+            step *= 0.5;
+        }
+    }
+    best
 }
 
 fn shifted(from: &[Vector3<f64>], to: &[Vector3<f64>]) -> Option<Similarity> {
@@ -94,7 +130,7 @@ fn sized(test: &Cloud, base: &Cloud) -> Similarity {
     Similarity { scale, translation: b - a * scale, ..Similarity::shift(Vector3::zeros()) }
 }
 
-/// Iterated closest points (Besl and McKay, PAMI 1992), trimmed: the map, and the mean square of the kept distances.
+/// Iterated closest points (Besl and Mc Kay, PAMI 1992), trimmed: the map, and the mean square of the kept distances.
 fn closest_points(
     test: &[[f32; 3]],
     base: &Cloud,

@@ -27,7 +27,7 @@ pub struct Rule {
 
 impl Default for Rule {
     fn default() -> Self {
-        Self { ambiguity_ratio: 2.0, max_shape_share: 0.02, max_intensity: 0.75 }
+        Self { ambiguity_ratio: 2.5, max_shape_share: 0.02, max_intensity: 0.75 }
     }
 }
 

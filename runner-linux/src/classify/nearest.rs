@@ -127,24 +127,86 @@ impl NearestPoints {
         }
     }
 
-    /// The nearest points of many, in their order; the same for any number of threads. Neighbours in the order are
-    /// best neighbours in space: each search begins with the answer before.
+    /// The nearest points of many, in their order; the same for any number of threads.
+    ///
+    /// They are searched along a Morton curve, each from the answer before: neighbours on the curve are neighbours in
+    /// space, and their part of the tree is in the cache.
     pub fn nearest_of_each(&self, queries: &[[f32; 3]], points: &[[f32; 3]]) -> Vec<Option<Nearest>> {
-        let mut found = vec![None; queries.len()];
-        found.par_chunks_mut(CHUNK).zip(queries.par_chunks(CHUNK)).for_each(|(found, queries)| {
-            let mut before: Option<u32> = None;
-            for (found, &query) in found.iter_mut().zip(queries) {
-                let start = before.and_then(|number| Some((number, points.get(number as usize)?)));
-                let start = match start {
-                    Some((number, point)) => Nearest { number, squared: squared(query, *point) },
+        let order = along_curve(queries);
+        let search = |chunk: &[(u32, u32)]| -> Vec<(u32, Option<Nearest>)> {
+            let mut before = Nearest { number: u32::MAX, squared: f32::INFINITY };
+            let search = |&(_, number): &(u32, u32)| {
+                let query = queries[number as usize];
+                let start = match points.get(before.number as usize) {
+                    Some(point) => Nearest { squared: squared(query, *point), ..before },
                     None => Nearest { number: u32::MAX, squared: f32::INFINITY },
                 };
-                *found = self.nearest_from(query, start);
-                before = found.map(|nearest| nearest.number);
-            }
-        });
+                let found = self.nearest_from(query, start);
+                before = found.unwrap_or(before);
+                (number, found)
+            };
+            chunk.iter().map(search).collect()
+        };
+        // Handing work to the only other thread would cost more than it is worth.
+        let chunks: Vec<_> = if rayon::current_num_threads() == 1 {
+            order.chunks(CHUNK).map(search).collect()
+        } else {
+            order.par_chunks(CHUNK).map(search).collect()
+        };
+        let mut found = vec![None; queries.len()];
+        for (number, nearest) in chunks.into_iter().flatten() {
+            found[number as usize] = nearest;
+        }
         found
     }
+}
+
+/// Place on a Morton curve over the extent of the points, 10 bits an axis, and number, sorted.
+fn along_curve(points: &[[f32; 3]]) -> Vec<(u32, u32)> {
+    let (mut low, mut high) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
+    for point in points.iter().filter(|point| point.iter().all(|c| c.is_finite())) {
+        for ((low, high), &c) in low.iter_mut().zip(&mut high).zip(point) {
+            *low = if c < *low { c } else { *low };
+            *high = if c > *high { c } else { *high };
+        }
+    }
+    let scale = [0, 1, 2].map(|axis: usize| 1_023.0 / (high[axis] - low[axis]).max(f32::MIN_POSITIVE));
+    let spread = |value: f32| {
+        // What is not finite saturates; ten bits, two free places between each.
+        let mut bits = (value as u32).min(1_023);
+        bits = (bits | bits << 16) & 0x0300_00FF;
+        bits = (bits | bits << 8) & 0x0300_F00F;
+        bits = (bits | bits << 4) & 0x030C_30C3;
+        (bits | bits << 2) & 0x0924_9249
+    };
+    let place = |point: &[f32; 3]| {
+        let axis = |axis: usize| spread((point[axis] - low[axis]) * scale[axis]);
+        axis(0) | axis(1) << 1 | axis(2) << 2
+    };
+    let entries: Vec<(u32, u32)> = (0..).zip(points).map(|(number, point)| (place(point), number)).collect();
+    sorted_by_place(entries)
+}
+
+/// Three passes of a counting sort over ten bits each; equal places keep their order.
+fn sorted_by_place(mut entries: Vec<(u32, u32)>) -> Vec<(u32, u32)> {
+    let mut other = vec![(0, 0); entries.len()];
+    for shift in [0, 10, 20] {
+        let mut starts = [0_usize; 1_024];
+        for (place, _) in &entries {
+            starts[(place >> shift & 1_023) as usize] += 1;
+        }
+        let mut sum = 0;
+        for start in &mut starts {
+            (*start, sum) = (sum, sum + *start);
+        }
+        for &entry in &entries {
+            let start = &mut starts[(entry.0 >> shift & 1_023) as usize];
+            other[*start] = entry;
+            *start += 1;
+        }
+        std::mem::swap(&mut entries, &mut other);
+    }
+    entries
 }
 
 #[inline(always)]
@@ -175,6 +237,10 @@ impl Leaf {
         for slot in 0..LEAF {
             let (x, y, z) = (query[0] - xs[slot], query[1] - ys[slot], query[2] - zs[slot]);
             squares[slot] = x * x + y * y + z * z;
+        }
+        let least = squares.iter().fold(f32::INFINITY, |least, &square| if square < least { square } else { least });
+        if least > best.squared {
+            return;
         }
         for (&squared, &number) in squares.iter().zip(&self.numbers) {
             if squared < best.squared || (squared == best.squared && number < best.number) {

@@ -231,7 +231,9 @@ fn place(args: &Args, made: &mut crate::synthesize::reconstruct::Reconstruction)
             (upright(made, &Scale::None).ok_or("the cameras do not say where up is")?, "first_baseline")
         }
         None => {
-            return Err("the first two pictures are not both part of the model, so their distance gives no scale".into());
+            return Err(
+                "the first two pictures are not both part of the model, so their distance gives no scale".into()
+            );
         }
     };
     moved(made, &map);

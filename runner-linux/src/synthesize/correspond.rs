@@ -12,6 +12,11 @@ use super::view::{Station, Track, View};
 pub const INLIER_PX: f64 = 1.5;
 /// Fewer agreeing matches may be chance: a pair of views with fewer is not used.
 pub const MIN_INLIERS: usize = 24;
+/// Look-alikes of different buildings agree by chance and by their horizontal rows of windows: a quarter of them did. The pair
+/// that a model begins with, or that shows that cameras are right, must have more.
+pub const MIN_SHARE: f64 = 0.4;
+/// The same for pairs that join what is certain already.
+const MIN_JOINING_SHARE: f64 = 0.15;
 
 /// What became of the matches of a pair of views.
 #[derive(Debug, Clone)]
@@ -20,10 +25,19 @@ pub struct PairMatches {
     pub views: [usize; 2],
     /// Look-alikes before any geometry.
     pub alike: usize,
-    /// Numbers of the features that match, one of each view.
+    /// How many of them agree with the pair's geometry.
+    pub agreeing: usize,
+    /// Numbers of the features that match, one of each view: those that agree, and those found with the geometry's help.
     pub matches: Vec<[u32; 2]>,
     /// The relative pose; `None` if the views do not share enough.
     pub estimate: Option<Estimate>,
+}
+
+impl PairMatches {
+    /// The share of the look-alikes that agree.
+    pub fn share(&self) -> f64 {
+        self.agreeing as f64 / self.alike.max(1) as f64
+    }
 }
 
 /// Why matches were removed, over all pairs.
@@ -67,7 +81,8 @@ fn matched([a, b]: [usize; 2], views: &[View], features: &[ViewFeatures], geomet
     };
     let directions: Vec<Pair> = alike.iter().map(|&pair| direction(pair)).collect();
     let threshold = 2.0 * INLIER_PX / (left.focal[0] + right.focal[0]);
-    let none = |alike: usize| PairMatches { views: [a, b], alike, matches: Vec::new(), estimate: None };
+    let none =
+        |agreeing| PairMatches { views: [a, b], alike: alike.len(), agreeing, matches: Vec::new(), estimate: None };
     let seed = (a * 65_536 + b) as u64;
     let estimate = match geometry {
         Geometry::Known(stations) => match (stations[a], stations[b]) {
@@ -80,15 +95,15 @@ fn matched([a, b]: [usize; 2], views: &[View], features: &[ViewFeatures], geomet
             let images: Vec<_> = alike.iter().map(|&pair| at(pair)).collect();
             let inliers = affine_inliers(&images, AFFINE_INLIER_PX, seed);
             if inliers.len() < MIN_INLIERS {
-                return none(alike.len());
+                return none(inliers.len());
             }
-            let matches = inliers.iter().map(|&number| alike[number]).collect();
-            return PairMatches { views: [a, b], alike: alike.len(), matches, estimate: None };
+            let matches: Vec<[u32; 2]> = inliers.iter().map(|&number| alike[number]).collect();
+            return PairMatches { views: [a, b], alike: alike.len(), agreeing: matches.len(), matches, estimate: None };
         }
     };
-    let Some(mut estimate) = estimate.filter(|estimate| estimate.inliers.len() >= MIN_INLIERS) else {
-        return none(alike.len());
-    };
+    let agreeing = estimate.as_ref().map_or(0, |estimate| estimate.inliers.len());
+    let enough = agreeing >= MIN_INLIERS && agreeing as f64 >= MIN_JOINING_SHARE * alike.len() as f64;
+    let Some(mut estimate) = estimate.filter(|_| enough) else { return none(agreeing) };
     let mut matches: Vec<[u32; 2]> = estimate.inliers.iter().map(|&number| alike[number]).collect();
     // With the geometry known, look-alikes that were not clear before may be now.
     let limit = threshold * threshold;
@@ -108,7 +123,7 @@ fn matched([a, b]: [usize; 2], views: &[View], features: &[ViewFeatures], geomet
     if matches!(geometry, Geometry::Lenses) {
         estimate.pose = estimate.pose.refined(&refined.iter(), threshold / 2.0, 10);
     }
-    PairMatches { views: [a, b], alike: alike.len(), matches, estimate: Some(estimate) }
+    PairMatches { views: [a, b], alike: alike.len(), agreeing, matches, estimate: Some(estimate) }
 }
 
 /// The same with a geometry that is known.
@@ -142,9 +157,7 @@ pub fn tracks(features: &[ViewFeatures], pairs: &[PairMatches]) -> (Vec<Track>, 
             removed.pair_without_geometry += pair.alike;
             continue;
         }
-        // Guided matches came afterwards.
-        let kept = pair.estimate.as_ref().map_or(pair.matches.len(), |estimate| estimate.inliers.len());
-        removed.off_epipolar_line += pair.alike - kept.min(pair.alike);
+        removed.off_epipolar_line += pair.alike - pair.agreeing;
         for &[i, j] in &pair.matches {
             let a = root(&mut parent, first[pair.views[0]] + i as usize);
             let b = root(&mut parent, first[pair.views[1]] + j as usize);

@@ -3,6 +3,7 @@
 use daymark_core::extract::{Extractor, FeatureSet, FrontEnd};
 use daymark_core::feature::Signature;
 use daymark_core::image::FrameError;
+use daymark_core::kernel::Kernels;
 use daymark_core::pyramid::level_bytes;
 use daymark_core::tone::TonedFrame;
 
@@ -18,6 +19,12 @@ const STRIP: usize = 256;
 const MAX_BITS: u32 = 40;
 /// The best match must have at most this share of the next one's bits, in hundredths.
 const RATIO_PERCENT: u32 = 85;
+/// Along a line there are fewer to be mistaken for.
+const GUIDED_RATIO_PERCENT: u32 = 80;
+/// A line holds dozens of features, and one of them is always on it: signatures must be nearer than elsewhere.
+const MAX_GUIDED_BITS: u32 = 28;
+/// Bits at which a rival is looked at.
+const MAX_RIVAL_BITS: u8 = 48;
 /// What lies this near is the same place, no competitor; pixels.
 const SAME_PLACE: f64 = 6.0;
 
@@ -56,45 +63,39 @@ pub fn features(view: &View) -> Result<ViewFeatures, FrameError> {
     Ok(found)
 }
 
-#[inline(always)]
-fn bits(a: &Signature, b: &Signature) -> u32 {
-    (a.0[0] ^ b.0[0]).count_ones() + (a.0[1] ^ b.0[1]).count_ones()
-}
-
 /// Pairs of features whose signatures are nearest to one another in both directions, clearly nearer than the next ones
 /// elsewhere. Ties have no match. `O(n m)`.
 pub fn mutual_matches(first: &ViewFeatures, second: &ViewFeatures) -> Vec<[u32; 2]> {
-    let forward = nearest(first, second);
-    let back = nearest(second, first);
-    (0_u32..)
-        .zip(&forward)
-        .filter_map(|(number, best)| {
-            let best = (*best)?;
-            (back.get(best as usize).copied().flatten() == Some(number)).then_some([number, best])
+    let mut row = vec![0; first.points.len().max(second.points.len())];
+    (0..first.points.len())
+        .filter_map(|number| {
+            let best = nearest(first.signatures[number], second, &mut row)?;
+            // The way back is looked for only where there is one.
+            let back = nearest(second.signatures[best], first, &mut row)?;
+            (back == number).then_some([number as u32, best as u32])
         })
         .collect()
 }
 
-fn nearest(from: &ViewFeatures, to: &ViewFeatures) -> Vec<Option<u32>> {
-    let mut distances = vec![0; to.signatures.len()];
-    from.signatures
-        .iter()
-        .map(|signature| {
-            for (distance, other) in distances.iter_mut().zip(&to.signatures) {
-                *distance = bits(signature, other);
-            }
-            let (best, &least) = distances.iter().enumerate().min_by_key(|(number, distance)| (**distance, *number))?;
-            if least > MAX_BITS {
-                return None;
-            }
-            let limit = least * 100 / RATIO_PERCENT;
-            let [x, y] = to.points[best];
-            let rival = distances.iter().zip(&to.points).any(|(&distance, at)| {
-                distance <= limit && ((at[0] - x).abs() > SAME_PLACE || (at[1] - y).abs() > SAME_PLACE)
-            });
-            (!rival).then_some(best as u32)
-        })
-        .collect()
+/// The feature nearest to a signature, if it is near and no other one elsewhere comes close.
+fn nearest(signature: Signature, to: &ViewFeatures, row: &mut [u8]) -> Option<usize> {
+    let row = row.get_mut(..to.signatures.len())?;
+    with_kernels!(Processor::detect(), kernels => {
+        kernels.distances(signature, &to.signatures, row);
+        let least = row.iter().copied().min()?;
+        if u32::from(least) > MAX_BITS {
+            return None;
+        }
+        let best = row.iter().position(|&distance| distance == least)?;
+        let limit = (u32::from(least) * 100 / RATIO_PERCENT) as u8;
+        let mut rival = false;
+        kernels.each_at_most(row, limit, &mut |other| rival |= elsewhere(to.points[other], to.points[best]));
+        (!rival).then_some(best)
+    })
+}
+
+fn elsewhere(a: [f64; 2], b: [f64; 2]) -> bool {
+    (a[0] - b[0]).abs() > SAME_PLACE || (a[1] - b[1]).abs() > SAME_PLACE
 }
 
 /// For features without a match: the nearest signature among those that `near` allows, if no other comes close.
@@ -108,32 +109,25 @@ pub fn guided_matches(
     for &[a, b] in known {
         (left[a as usize], right[b as usize]) = (true, true);
     }
-    let mut found: Vec<(u32, [u32; 2])> = Vec::new();
+    let mut found: Vec<(u8, [u32; 2])> = Vec::new();
+    let mut row = vec![0; second.points.len()];
     for (a, signature) in first.signatures.iter().enumerate().filter(|(a, _)| !left[*a]) {
-        let (mut best, mut next) = ((u32::MAX, 0), u32::MAX);
-        for (b, other) in second.signatures.iter().enumerate().filter(|(b, _)| !right[*b]) {
-            let distance = bits(signature, other);
-            if distance > MAX_BITS + 8 || distance >= next || !near(first.ideal[a], second.ideal[b]) {
-                continue;
-            }
-            if distance < best.0 {
-                let [x, y] = second.points[best.1];
-                let at = second.points[b];
-                let elsewhere = (at[0] - x).abs() > SAME_PLACE || (at[1] - y).abs() > SAME_PLACE;
-                if best.0 < u32::MAX && elsewhere {
-                    next = best.0;
+        let mut candidates: Vec<(u8, usize)> = Vec::new();
+        with_kernels!(Processor::detect(), kernels => {
+            kernels.distances(*signature, &second.signatures, &mut row);
+            kernels.each_at_most(&row, MAX_RIVAL_BITS, &mut |b| {
+                if !right[b] && near(first.ideal[a], second.ideal[b]) {
+                    candidates.push((row[b], b));
                 }
-                best = (distance, b);
-            } else {
-                let [x, y] = second.points[best.1];
-                let at = second.points[b];
-                if (at[0] - x).abs() > SAME_PLACE || (at[1] - y).abs() > SAME_PLACE {
-                    next = distance;
-                }
-            }
-        }
-        if best.0 <= MAX_BITS && best.0 * 100 <= next.saturating_mul(90) {
-            found.push((best.0, [a as u32, best.1 as u32]));
+            });
+        });
+        candidates.sort_unstable();
+        let Some(&(least, best)) = candidates.first().filter(|(least, _)| u32::from(*least) <= MAX_GUIDED_BITS) else {
+            continue;
+        };
+        let next = candidates.iter().find(|(_, other)| elsewhere(second.points[*other], second.points[best]));
+        if next.is_none_or(|(next, _)| u32::from(least) * 100 <= u32::from(*next) * GUIDED_RATIO_PERCENT) {
+            found.push((least, [a as u32, best as u32]));
         }
     }
     // One to one, the best first.

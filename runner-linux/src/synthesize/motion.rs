@@ -7,7 +7,7 @@ use nalgebra::{Matrix3, Vector3};
 use serde::Serialize;
 
 use super::bundle::{Bundle, Common, Free, Observation};
-use super::correspond::{MIN_INLIERS, PairMatches};
+use super::correspond::{MIN_INLIERS, MIN_SHARE, PairMatches};
 use super::view::{Station, Track, View};
 use crate::camera_file::distortion::Distortion;
 use crate::camera_file::lens::{Lens, Pose};
@@ -18,9 +18,11 @@ use crate::camera_file::lens::{Lens, Pose};
 pub enum NoMotion {
     /// No pair of views shares enough.
     TooFewMatches {
-        /// The most matches of a pair that agree with one geometry.
+        /// Look-alikes of the best pair.
+        alike: usize,
+        /// How many of them agree with one geometry.
         found: usize,
-        /// What is needed.
+        /// How many are needed.
         needed: usize,
     },
     /// The best pair is explained by a turn of the camera.
@@ -43,10 +45,10 @@ pub enum NoMotion {
 impl fmt::Display for NoMotion {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::TooFewMatches { found, needed } => write!(
+            Self::TooFewMatches { alike, found, needed } => write!(
                 f,
-                "no two pictures share one geometry: the best pair has {found} matches that agree, {needed} are needed; \
-                 do they show the same building, from not too far apart?"
+                "no two pictures share one geometry: of {alike} look-alikes of the best pair {found} agree, {needed} are \
+                 needed; do they show the same building, from not too far apart?"
             ),
             Self::OnlyRotation { share } => write!(
                 f,
@@ -100,7 +102,8 @@ pub struct Motion {
 /// # Errors
 /// [`NoMotion`] if none is good enough: what the one with the most matches lacks.
 fn first_pair(pairs: &[PairMatches]) -> Result<&PairMatches, NoMotion> {
-    let usable = || pairs.iter().filter_map(|pair| Some((pair, pair.estimate.as_ref()?)));
+    let certain = pairs.iter().filter(|pair| pair.share() >= MIN_SHARE);
+    let usable = || certain.clone().filter_map(|pair| Some((pair, pair.estimate.as_ref()?)));
     let score = |pair: &PairMatches, parallax: f64| pair.matches.len() as f64 * parallax.min(10.0);
     let good = usable().filter(|(_, estimate)| {
         estimate.rotation_share < MAX_ROTATION
@@ -112,8 +115,10 @@ fn first_pair(pairs: &[PairMatches]) -> Result<&PairMatches, NoMotion> {
         return Ok(pair);
     }
     let Some((_, most)) = usable().max_by_key(|(pair, _)| pair.matches.len()) else {
-        let found = pairs.iter().map(|pair| pair.matches.len()).max().unwrap_or(0);
-        return Err(NoMotion::TooFewMatches { found, needed: MIN_INLIERS });
+        let best = pairs.iter().max_by_key(|pair| pair.agreeing);
+        let (alike, found) = best.map_or((0, 0), |best| (best.alike, best.agreeing));
+        let needed = MIN_INLIERS.max(libm::ceil(alike as f64 * MIN_SHARE) as usize);
+        return Err(NoMotion::TooFewMatches { alike, found, needed });
     };
     Err(if most.rotation_share >= MAX_ROTATION {
         NoMotion::OnlyRotation { share: most.rotation_share }

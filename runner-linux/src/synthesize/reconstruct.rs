@@ -79,7 +79,9 @@ pub struct PairFacts {
     pub views: [usize; 2],
     /// Look-alikes.
     pub alike: usize,
-    /// Matches after epipolar geometry.
+    /// How many of them agree with the pair's geometry.
+    pub agreeing: usize,
+    /// Those, and those found with the geometry's help.
     pub matches: usize,
     /// Median angle between rays, degrees; 0 if cameras were known.
     pub parallax_degree: f64,
@@ -160,6 +162,7 @@ pub fn reconstruct(
         .map(|pair| PairFacts {
             views: pair.views.map(|view| view + 1),
             alike: pair.alike,
+            agreeing: pair.agreeing,
             matches: pair.matches.len(),
             parallax_degree: pair.estimate.as_ref().map_or(0.0, |estimate| estimate.parallax_degree),
             plane_share: pair.estimate.as_ref().map_or(0.0, |estimate| estimate.plane_share),
@@ -185,12 +188,11 @@ pub fn reconstruct(
         }
         (Cameras::Known(_), stations) => {
             shape = Shape::Metric;
-            let best = matches.iter().max_by_key(|pair| pair.alike);
-            let agreeing = matches.iter().map(|pair| pair.matches.len()).max().unwrap_or(0);
-            if let (Some(best), Corners::Automatic) = (best, corners)
-                && agreeing < correspond::MIN_INLIERS
+            // The pair with the most look-alikes tells whether the cameras are these pictures'.
+            if let (Some(best), Corners::Automatic) = (matches.iter().max_by_key(|pair| pair.alike), corners)
+                && (best.agreeing < correspond::MIN_INLIERS || best.share() < correspond::MIN_SHARE)
             {
-                return Err(NoModel::OtherCameras { alike: best.alike, agreeing });
+                return Err(NoModel::OtherCameras { alike: best.alike, agreeing: best.agreeing });
             }
             (views, stations.unwrap_or_default(), tracks)
         }
@@ -255,7 +257,8 @@ fn picked_pairs(views: &[View], tracks: &[Track], known: bool) -> Vec<PairMatche
             let threshold = 2.0 * 2.0 * correspond::INLIER_PX / (left.focal[0] + right.focal[0]);
             let estimate = if known { None } else { relative_pose(&directions, threshold, (a * 65_536 + b) as u64) };
             let matches = shared.iter().map(|(number, _)| [*number; 2]).collect();
-            PairMatches { views: [a, b], alike: shared.len(), matches, estimate }
+            let agreeing = estimate.as_ref().map_or(shared.len(), |estimate| estimate.inliers.len());
+            PairMatches { views: [a, b], alike: shared.len(), agreeing, matches, estimate }
         })
         .collect()
 }

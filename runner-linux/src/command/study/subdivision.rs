@@ -51,12 +51,12 @@ struct Document {
     program_version: &'static str,
     seeds: u32,
     corner_noise_px: f64,
-    levels: Vec<Level>,
+    levels: Vec<Row>,
     picked_level: u8,
 }
 
 #[derive(Debug, Clone, Serialize)]
-struct Level {
+struct Row {
     level: u8,
     /// Mean of the root mean square distance of tests from their own base.
     within_rms_millimetre: f64,
@@ -142,7 +142,7 @@ fn study(
     bases: &[Made],
     tests: &[(usize, Model, TowerViews)],
     bar: &ProgressBar,
-) -> Result<Level, CommandError> {
+) -> Result<Row, CommandError> {
     let mut largest = 0;
     let mut cloud = |model: &Model, views: &TowerViews| -> Result<Cloud, CommandError> {
         let dense = model.dense(level, views.views(), views.stations())?;
@@ -187,7 +187,7 @@ fn study(
         bar.inc(1);
     }
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len().max(1) as f64;
-    Ok(Level {
+    Ok(Row {
         level: level.number(),
         within_rms_millimetre: 1_000.0 * mean(&within),
         between_rms_millimetre: 1_000.0 * mean(&between),
@@ -251,7 +251,7 @@ fn html(document: &Document) -> String {
         .iter()
         .map(|level| level.signal_to_noise.max(level.intensity_signal_to_noise))
         .fold(1.0, f64::max);
-    let curve = |value: fn(&Level) -> f64, colour, dashed| Curve {
+    let curve = |value: fn(&Row) -> f64, colour, dashed| Curve {
         points: document.levels.iter().map(|level| [f64::from(level.level), value(level)]).collect(),
         colour,
         dashed,

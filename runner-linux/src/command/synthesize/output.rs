@@ -142,8 +142,9 @@ pub(super) fn text(facts: &Facts, path: &Path, explain: bool) -> String {
             let [a, b] = pair.views;
             let _ = writeln!(
                 text,
-                "  pair {a} {b}: {} look-alikes, {} matches, parallax {:.1} degrees, {:.0} % in one plane",
+                "  pair {a} {b}: {} look-alikes, {} agree, {} matches with the geometry's help, parallax {:.1} degrees, {:.0} % in one plane",
                 pair.alike,
+                pair.agreeing,
                 pair.matches,
                 pair.parallax_degree,
                 pair.plane_share * 100.0
