@@ -150,6 +150,8 @@ impl Drawing<'_> {
 
     fn quads(&self, quads: &[LayerQuadFate], places: [Place; 2]) -> Group {
         let mut group = Group::new().set("class", "quads");
+        // Many on top of one another would hide the picture.
+        let faint = (40.0 / quads.len().max(1) as f32).min(1.0);
         // The matched ones last, on top.
         let mut order: Vec<&LayerQuadFate> = quads.iter().collect();
         order.sort_by_key(|quad| core::cmp::Reverse(quad.fate));
@@ -160,17 +162,17 @@ impl Drawing<'_> {
                 let Some(vertices) = vertices else { continue };
                 let opacity = match quad.fate {
                     QuadFate::Matched => 0.30,
-                    QuadFate::Contradicts | QuadFate::Off | QuadFate::Unverified => 0.13,
-                    QuadFate::Unlike | QuadFate::Thin => 0.05,
+                    QuadFate::Contradicts | QuadFate::Off | QuadFate::Unverified => 0.13 * faint,
+                    QuadFate::Unlike | QuadFate::Thin => 0.05 * faint,
                 };
                 let points = vertices.iter().map(|&vertex| self.point(side, places[side], vertex));
                 group = group.add(
                     polygon(points)
                         .set("class", "quad")
                         .set("fill", fate_colour(quad.fate))
-                        .set("fill-opacity", opacity)
+                        .set("fill-opacity", format!("{opacity:.3}"))
                         .set("stroke", fate_colour(quad.fate))
-                        .set("stroke-opacity", opacity * 2.0)
+                        .set("stroke-opacity", format!("{:.3}", opacity * 2.0))
                         .add(Title::new(title.clone())),
                 );
             }
