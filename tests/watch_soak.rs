@@ -1,7 +1,7 @@
 //! Many frames with many faults: memory stays flat, no thread stays, and no building is missed.
 //!
 //! The plumbing is soaked with a stub that recognizes a number written into the frame. The real recognizer is soaked by
-//! `cargo test --release -p daymark --test watch_soak -- --ignored`, which takes some minutes; SOAK_FRAMES changes its length.
+//! `cargo test --release -p daymark --test watch_soak -- --ignored`, which takes some minutes; `SOAK_FRAMES` changes its length.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;

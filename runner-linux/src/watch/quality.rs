@@ -80,7 +80,7 @@ const SHARP: u64 = 24;
 
 /// Judges a frame of about 640 px, from every other row.
 ///
-/// *Blurred* is measured on edges, [`sharpness`]; a picture of high contrast without edges is blurred, too.
+/// *Blurred* is measured on edges (`sharpness`); a picture of high contrast without edges is blurred, too.
 pub fn quality(frame: &GrayImage) -> Quality {
     let rows = || frame.pixels.chunks_exact(frame.width.max(1)).step_by(2);
     let count = rows().map(|row| row.len() as u64).sum::<u64>().max(1);
