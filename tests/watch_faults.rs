@@ -145,11 +145,7 @@ fn whoever_is_slow_gets_the_newest_frames_and_the_others_are_counted() {
     let count = |key: &str| counters[key].as_u64().expect("a count");
     assert_eq!((count("frames"), count("looked_at") + count("stale")), (300, 300));
     assert!(count("stale") > 100, "frames come faster than they are looked at: {counters}");
-    assert_eq!(
-        lines.iter().filter(|line| line["type"] == "frame").last().expect("a frame")["frame"],
-        299,
-        "the newest"
-    );
+    assert_eq!(lines.iter().rfind(|line| line["type"] == "frame").expect("a frame")["frame"], 299, "the newest");
     assert!(story(&lines).iter().any(|line| line.starts_with("answer")));
 }
 
