@@ -68,10 +68,7 @@ impl<'a> Question<'a> {
             let inliers = settled.map_or(0, |settled| settled.inside);
             // Does it fit from behind?
             let behind = self.front.take().is_some()
-                && self
-                    .by_all(shape, flatness)
-                    .or_else(|| self.by_draws())
-                    .is_some_and(|other| self.stands(&other));
+                && self.by_all(shape, flatness).or_else(|| self.by_draws()).is_some_and(|other| self.stands(&other));
             return Err(if behind { NoPose::Mirrored } else { NoPose::NoConsensus { inliers, points } });
         };
         self.beside_plane(&settled)?;

@@ -289,10 +289,7 @@ mod tests {
 
     #[test]
     fn bars_are_round() {
-        assert_eq!(
-            [40.0, 100.0, 260.0, 5_000.0].map(bar_metres).map(|metres| metres.round()),
-            [10.0, 20.0, 50.0, 1_000.0]
-        );
+        assert_eq!([40.0, 100.0, 260.0, 5_000.0].map(bar_metres).map(f64::round), [10.0, 20.0, 50.0, 1_000.0]);
     }
 
     #[test]
