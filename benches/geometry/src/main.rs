@@ -1,5 +1,9 @@
-//! Hulls and nested hulls of many different point sets: daymark beside other programs, in turns.
+//! Hulls and nested hulls of many different point sets: daymark beside other programs, in turns. Then correspondences of
+//! two views.
+//!
+//!     cargo run --release [-- hull | layers | correspond]
 
+mod correspond;
 mod measure;
 mod ours;
 mod peers;
@@ -10,6 +14,9 @@ use sets::{Sets, Source};
 
 fn main() {
     let only = std::env::args().nth(1);
+    if only.as_deref() == Some("correspond") {
+        return correspond::measure();
+    }
     println!(
         "{:<10} {:<8} {:>6} {:>6}  {:<28} {:>10} {:>7}",
         "task", "points", "count", "sets", "program", "us a set", "ratio"
@@ -52,5 +59,8 @@ fn main() {
     if !agreed {
         eprintln!("programs disagree: see above");
         std::process::exit(1);
+    }
+    if only.is_none() {
+        correspond::measure();
     }
 }

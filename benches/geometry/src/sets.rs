@@ -62,6 +62,34 @@ impl Sets {
     }
 }
 
+/// Corners, 12 px apart at least, and another view of them.
+pub struct Views {
+    pub first: Vec<ImagePoint>,
+    pub second: Vec<ImagePoint>,
+    /// The number in the second view of each corner of the first.
+    pub partner: Vec<u16>,
+}
+
+impl Views {
+    /// `count` pairs of views of `size` corners: turned, stretched and sheared, in another order, with noise of
+    /// `sigma` px on each coordinate.
+    pub fn pairs(count: usize, size: usize, sigma: f64) -> Vec<Self> {
+        let mut random = Random(11);
+        let mut pair = || {
+            let first = random.apart(size);
+            let order = random.chosen(&(0..size as u16).collect::<Vec<_>>(), size);
+            let shuffled = order.iter().map(|&number| first[usize::from(number)]).collect();
+            let second = random.mapped(shuffled).into_iter().map(|p| random.moved(p, sigma)).collect();
+            let mut partner = vec![0; size];
+            for (number, &of) in (0..).zip(&order) {
+                partner[usize::from(of)] = number;
+            }
+            Self { first, second, partner }
+        };
+        (0..count).map(|_| pair()).collect()
+    }
+}
+
 /// SplitMix64.
 #[derive(Clone)]
 struct Random(u64);
@@ -78,7 +106,29 @@ impl Random {
         (0..count).map(|_| ImagePoint::new(self.below(width), self.below(height))).collect()
     }
 
-    fn chosen(&mut self, points: &[ImagePoint], count: usize) -> Vec<ImagePoint> {
+    /// In a frame of 640 x 480 px.
+    fn apart(&mut self, count: usize) -> Vec<ImagePoint> {
+        let mut points: Vec<ImagePoint> = Vec::new();
+        while points.len() < count {
+            let point = ImagePoint::new(self.below(640 * SUBPIXEL), self.below(480 * SUBPIXEL));
+            if points.iter().all(|other| (other.x - point.x).abs() + (other.y - point.y).abs() > 12 * SUBPIXEL) {
+                points.push(point);
+            }
+        }
+        points
+    }
+
+    /// By twelve uniform numbers added up, for each coordinate.
+    fn moved(&mut self, point: ImagePoint, sigma: f64) -> ImagePoint {
+        const STEPS: i32 = 1 << 20;
+        let mut noise = || {
+            let normal = (0..12).map(|_| f64::from(self.below(STEPS)) / f64::from(STEPS)).sum::<f64>() - 6.0;
+            (sigma * f64::from(SUBPIXEL) * normal).round() as i32
+        };
+        ImagePoint::new(point.x + noise(), point.y + noise())
+    }
+
+    fn chosen<T: Copy>(&mut self, points: &[T], count: usize) -> Vec<T> {
         let mut points = points.to_vec();
         for at in 0..count {
             let other = at + self.below((points.len() - at) as i32) as usize;

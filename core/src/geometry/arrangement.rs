@@ -11,6 +11,7 @@ use heapless::Vec;
 use super::cross_ratio::FivePoints;
 use super::proposal::{Invariance, Origin, Pairing, Proposal, Terms};
 use super::quad::{Expected, Quad};
+use super::sieve::{Shape, Sieve};
 use crate::math::log2;
 use crate::point::ImagePoint;
 
@@ -32,6 +33,7 @@ pub struct Arrangement {
     key: f32,
     /// Its uncertainty.
     spread: f32,
+    shape: Shape,
     /// The corner, then the neighbours.
     corners: [u16; 5],
 }
@@ -124,21 +126,26 @@ fn places(points: &[ImagePoint], corners: [u16; 5]) -> [ImagePoint; 5] {
 
 /// The arrangement with its key, unless its first triangles are too thin to say anything.
 fn describe(points: &[ImagePoint], corners: [u16; 5], terms: Terms) -> Option<Arrangement> {
-    let [centre, a, b, c, d] = places(points, corners);
-    let (key, spread) = match terms.invariance {
+    let places @ [centre, a, b, c, d] = places(points, corners);
+    let (key, spread, shape) = match terms.invariance {
         Invariance::Affine => {
             // Triangles (a, b, centre) and (b, centre, c): two of those around the corner.
             let quad = Quad::new([a, b, centre, c]);
+            let spread = quad.ratio_uncertainty(terms.sigma);
+            if !(spread <= MOST_UNCERTAIN) {
+                return None;
+            }
             let ratio = quad.ratio();
-            (log2((ratio.upper as f64 / ratio.lower as f64).abs()), quad.ratio_uncertainty(terms.sigma))
+            (log2((ratio.upper as f64 / ratio.lower as f64).abs()), spread, Shape::affine(places))
         }
         Invariance::Perspective => {
             let five = FivePoints::new([centre, a, b, c, d])?;
-            (five.key() * core::f64::consts::LOG2_E, five.key_uncertainty(terms.sigma))
+            let key = five.key() * core::f64::consts::LOG2_E;
+            (key, five.key_uncertainty(terms.sigma), Shape::perspective(&five, terms.sigma))
         }
     };
     // The key is in bits, and so is its spread.
-    let entry = Arrangement { key: key as f32, spread: (spread * core::f64::consts::LOG2_E) as f32, corners };
+    let entry = Arrangement { key: key as f32, spread: (spread * core::f64::consts::LOG2_E) as f32, shape, corners };
     (spread <= MOST_UNCERTAIN).then_some(entry)
 }
 
@@ -170,39 +177,74 @@ pub fn propose(
     super::heap_sort::sort_by(entries, |a, b| a.key.total_cmp(&b.key).then_with(|| a.corners.cmp(&b.corners)).is_lt());
     let widest = entries.iter().fold(0.0_f32, |most, entry| if entry.spread > most { entry.spread } else { most });
     each(first, |corners| {
-        let Some(wanted) = describe(first, corners, terms) else { return };
-        let reach =
-            |spread: f32| GATE_SIGMAS as f32 * crate::math::sqrt(wanted.spread * wanted.spread + spread * spread);
-        let from = entries.partition_point(|entry| entry.key < wanted.key - reach(widest));
-        for entry in entries.iter().skip(from) {
-            if entry.key > wanted.key + reach(widest) {
-                break;
-            }
-            if (entry.key - wanted.key).abs() <= reach(entry.spread)
-                && let Some(surprise) = compare(places(first, corners), places(second, entry.corners), terms)
-            {
-                let pairs = corners.iter().zip(&entry.corners);
-                let pairs = pairs.map(|(&first, &second)| Pairing { first, second });
-                let mut list = Vec::new();
-                for pair in pairs {
-                    let _ = list.push(pair);
+        let Some(entry) = describe(first, corners, terms) else { return };
+        let wanted = Wanted::new(entry, places(first, corners), terms);
+        let (least, most) = (entry.key - entry.reach(widest), entry.key + entry.reach(widest));
+        let from = entries.partition_point(|other| other.key < least);
+        let to = entries.partition_point(|other| other.key <= most);
+        wanted.sieve.each_passing(
+            entries.get(from..to).unwrap_or_default(),
+            |other| &other.shape,
+            |other| {
+                if (other.key - entry.key).abs() <= entry.reach(other.spread)
+                    && let Some(surprise) = wanted.compare(places(second, other.corners), terms)
+                {
+                    let mut pairs = Vec::new();
+                    for (&first, &second) in corners.iter().zip(&other.corners) {
+                        let _ = pairs.push(Pairing { first, second });
+                    }
+                    found(Proposal { pairs, surprise, origin: Origin::Arrangement });
                 }
-                found(Proposal { pairs: list, surprise, origin: Origin::Arrangement });
-            }
-        }
+            },
+        );
     });
 }
 
-/// How surprising it is that five points agree up to a map, in 1/256 bit; `None` if they do not.
-fn compare(p: [ImagePoint; 5], q: [ImagePoint; 5], terms: Terms) -> Option<i32> {
-    let ([p0, p1, p2, p3, p4], [q0, q1, q2, q3, q4]) = (p, q);
-    let bits = match terms.invariance {
-        Invariance::Affine => {
-            let expected = |points| Expected::new(&Quad::new(points), terms.sigma);
-            let one = terms.affine_bits(&expected([p0, p1, p2, p3]), [q0, q1, q2, q3])?;
-            one + terms.affine_bits(&expected([p0, p2, p3, p4]), [q0, q2, q3, q4])?
+impl Arrangement {
+    /// How far another key may be whose uncertainty is `spread`.
+    fn reach(&self, spread: f32) -> f32 {
+        GATE_SIGMAS as f32 * crate::math::sqrt(self.spread * self.spread + spread * spread)
+    }
+}
+
+/// What is compared of an arrangement of the first picture, worked out once.
+struct Wanted {
+    sieve: Sieve,
+    compared: Compared,
+}
+
+enum Compared {
+    /// The corner with the first three neighbours, and without the first.
+    Affine([Expected; 2]),
+    Perspective(Option<FivePoints>),
+}
+
+impl Wanted {
+    fn new(entry: Arrangement, places: [ImagePoint; 5], terms: Terms) -> Self {
+        let [centre, a, b, c, d] = places;
+        match terms.invariance {
+            Invariance::Affine => {
+                let expected = [[centre, a, b, c], [centre, b, c, d]];
+                let expected = expected.map(|points| Expected::new(&Quad::new(points), terms.sigma));
+                let sieve = Sieve::affine(entry.shape, places, &expected);
+                Self { sieve, compared: Compared::Affine(expected) }
+            }
+            Invariance::Perspective => {
+                let compared = Compared::Perspective(FivePoints::new(places));
+                Self { sieve: Sieve::Perspective(entry.shape), compared }
+            }
         }
-        Invariance::Perspective => terms.perspective_bits(&FivePoints::new(p)?, q)?,
-    };
-    Some((bits * 256.0) as i32)
+    }
+
+    /// How surprising it is that five points agree up to a map, in 1/256 bit; `None` if they do not.
+    fn compare(&self, images: [ImagePoint; 5], terms: Terms) -> Option<i32> {
+        let [centre, a, b, c, d] = images;
+        let bits = match &self.compared {
+            Compared::Affine([one, two]) => {
+                terms.affine_bits(one, [centre, a, b, c])? + terms.affine_bits(two, [centre, b, c, d])?
+            }
+            Compared::Perspective(five) => terms.perspective_bits(five.as_ref()?, images)?,
+        };
+        Some((bits * 256.0) as i32)
+    }
 }

@@ -92,6 +92,18 @@ impl FivePoints {
         f64::from(sigma) * sqrt_f64(self.covariance[0])
     }
 
+    /// `log2 |C2|`, its variance in bits² for noise of `sigma` px, and the signs of both cross-ratios as a number. Where
+    /// noise moves both cross-ratios almost as one the variance is infinite, since a distance by both is not exact then.
+    pub(super) fn second(&self, sigma: f32) -> (f64, f64, u8) {
+        const DEPENDENT: f64 = 1.0 - 1e-6;
+        let bits = core::f64::consts::LOG2_E;
+        let [xx, xy, yy] = self.covariance;
+        let variance = f64::from(sigma) * f64::from(sigma) * yy * bits * bits;
+        let independent = xy * xy <= DEPENDENT * xx * yy;
+        let [one, two] = self.negative.map(u8::from);
+        (self.logarithms[1] * bits, if independent { variance } else { f64::INFINITY }, one + 2 * two)
+    }
+
     /// How far `other` is from a perspective view of these points, given the noise `sigma` px of each coordinate in
     /// both. `None` if a cross-ratio has another sign, or nothing is certain.
     pub fn deviation(&self, other: &Self, sigma: f32) -> Option<PerspectiveDeviation> {

@@ -39,6 +39,7 @@ pub mod quad;
 pub mod cross_ratio;
 pub mod proposal;
 pub mod shift;
+mod sieve;
 pub mod arrangement;
 pub mod sorted_areas;
 pub mod consensus;

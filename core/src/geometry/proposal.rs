@@ -12,7 +12,7 @@ use crate::math::log2;
 use crate::point::ImagePoint;
 
 /// Squared Mahalanobis distance of two degrees of freedom that 99 % of the true quads keep.
-const GATE: f64 = 9.21;
+pub(super) const GATE: f64 = 9.21;
 
 /// What two views of the same corners are expected to keep.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

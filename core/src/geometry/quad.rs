@@ -205,6 +205,17 @@ impl Expected {
         Some(Residual { squared, determinant })
     }
 
+    /// The square of the longest residual within a squared distance of `gate` for a map that shrinks all to nothing, px⁶; and
+    /// the inverse square of the smaller singular value of the triangle that makes the map's linear part, about its centroid.
+    pub(super) fn bounds(&self, gate: f64) -> (f64, f64) {
+        let Triangle { edges: [[ux, uy], [vx, vy]], area } = self.triangle;
+        let [wx, wy] = [ux - vx, uy - vy];
+        let trace = (ux * ux + uy * uy + vx * vx + vy * vy + wx * wx + wy * wy) / 3.0;
+        let determinant = area * area / 3.0;
+        let root = crate::math::sqrt_f64(trace * trace - 4.0 * determinant);
+        (gate * self.variance, (trace + root) / (2.0 * determinant))
+    }
+
     /// Area in px² of the one-sigma ellipse in which the least certain point is expected.
     pub(super) fn ellipse(&self, residual: Residual) -> f64 {
         let root = crate::math::sqrt_f64(residual.determinant);
