@@ -1,6 +1,7 @@
 //! `daymark synthesize` as a person runs it: models of the fixtures' towers, and input that cannot work.
 
 #[path = "support/mod.rs"]
+#[allow(dead_code, reason = "other tests use the rest")]
 mod support;
 
 use std::fmt::Write as _;
@@ -55,21 +56,15 @@ fn synthesize(town: &Town, pictures: &[String], options: &[&str]) -> support::Ra
     town.run(&all)
 }
 
-fn with_cameras<'a>(names: &'a [String], cameras: &'a [String], rest: &[&'a str]) -> Vec<&'a str> {
-    let _ = names;
-    let mut options = vec!["--cameras"];
-    options.extend(cameras.iter().map(String::as_str));
-    options.extend(rest);
-    options
-}
-
 #[test]
 fn picked_corners_and_known_cameras_give_the_tower() {
     let town = Town::new();
     let names = shoot(&town, 1, &[-8.0, 22.0]);
     let (pictures, cameras, corners) =
         (arguments(&names, "pgm"), arguments(&names, "camera"), arguments(&names, "csv"));
-    let mut options = with_cameras(&names, &cameras, &["-o", "tower.ply", "--levels", "2", "--json", "--corners"]);
+    let mut options = vec!["-o", "tower.ply", "--levels", "2", "--json", "--cameras"];
+    options.extend(cameras.iter().map(String::as_str));
+    options.push("--corners");
     options.extend(corners.iter().map(String::as_str));
     let facts = synthesize(&town, &pictures, &options).succeeded().json();
     assert_eq!(facts["length_unit"], "camera_file_unit");
@@ -170,7 +165,7 @@ fn cameras_of_other_pictures_do_not_fit() {
 #[test]
 fn two_buildings_a_turn_and_a_plane_have_no_model() {
     let town = Town::new();
-    let mut refused = |pictures: &[String], expected: &str| {
+    let refused = |pictures: &[String], expected: &str| {
         let ran = synthesize(&town, pictures, &["-o", "m.glb", "--focal-px", "560", "--fixed-lens"]);
         assert_eq!(ran.code, Some(1), "{ran:#?}");
         assert!(ran.stderr.contains(expected), "lacks {expected:?}: {ran:#?}");

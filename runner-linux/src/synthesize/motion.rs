@@ -122,10 +122,11 @@ fn first_pair(pairs: &[PairMatches]) -> Result<&PairMatches, NoMotion> {
     };
     Err(if most.rotation_share >= MAX_ROTATION {
         NoMotion::OnlyRotation { share: most.rotation_share }
-    } else if most.parallax_degree < MIN_PARALLAX {
-        NoMotion::SmallParallax { degree: most.parallax_degree }
-    } else {
+    } else if most.plane_share >= MAX_PLANE {
+        // Before the parallax: a plane makes that doubtful, too.
         NoMotion::Plane { share: most.plane_share }
+    } else {
+        NoMotion::SmallParallax { degree: most.parallax_degree }
     })
 }
 
