@@ -3,7 +3,7 @@
 use daymark_core::extract::{Extractor, FeatureSet, FrontEnd};
 use daymark_core::feature::Signature;
 use daymark_core::image::FrameError;
-use daymark_core::kernel::Kernels;
+use daymark_core::kernel::{Kernels, places};
 use daymark_core::pyramid::level_bytes;
 use daymark_core::tone::TonedFrame;
 
@@ -88,8 +88,9 @@ fn nearest(signature: Signature, to: &ViewFeatures, row: &mut [u8]) -> Option<us
         }
         let best = row.iter().position(|&distance| distance == least)?;
         let limit = (u32::from(least) * 100 / RATIO_PERCENT) as u8;
-        let mut rival = false;
-        kernels.each_at_most(row, limit, &mut |other| rival |= elsewhere(to.points[other], to.points[best]));
+        let mut marks = vec![0; row.len().div_ceil(64)];
+        kernels.marks_at_most(row, limit, &mut marks);
+        let rival = places(&marks).any(|other| elsewhere(to.points[other], to.points[best]));
         (!rival).then_some(best)
     })
 }
@@ -111,15 +112,14 @@ pub fn guided_matches(
     }
     let mut found: Vec<(u8, [u32; 2])> = Vec::new();
     let mut row = vec![0; second.points.len()];
+    let mut marks = vec![0; row.len().div_ceil(64)];
     for (a, signature) in first.signatures.iter().enumerate().filter(|(a, _)| !left[*a]) {
         let mut candidates: Vec<(u8, usize)> = Vec::new();
         with_kernels!(Processor::detect(), kernels => {
             kernels.distances(*signature, &second.signatures, &mut row);
-            kernels.each_at_most(&row, MAX_RIVAL_BITS, &mut |b| {
-                if !right[b] && near(first.ideal[a], second.ideal[b]) {
-                    candidates.push((row[b], b));
-                }
-            });
+            kernels.marks_at_most(&row, MAX_RIVAL_BITS, &mut marks);
+            let allowed = places(&marks).filter(|&b| !right[b] && near(first.ideal[a], second.ideal[b]));
+            candidates.extend(allowed.map(|b| (row[b], b)));
         });
         candidates.sort_unstable();
         let Some(&(least, best)) = candidates.first().filter(|(least, _)| u32::from(*least) <= MAX_GUIDED_BITS) else {
