@@ -1,7 +1,6 @@
 //! `daymark classify` and `daymark study towers`.
 
 #[path = "support/mod.rs"]
-#[allow(dead_code, reason = "other tests use the rest")]
 mod support;
 
 use daymark::classify::towers::{BASE_ANGLES, Conditions, TEST_ANGLES, TowerViews};

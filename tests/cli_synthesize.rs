@@ -1,7 +1,6 @@
 //! `daymark synthesize` as a person runs it: models of the fixtures' towers, and input that cannot work.
 
 #[path = "support/mod.rs"]
-#[allow(dead_code, reason = "other tests use the rest")]
 mod support;
 
 use std::fmt::Write as _;
