@@ -284,34 +284,42 @@ fn plane_share(pairs: &[&Pair], threshold: f64, seed: u64) -> f64 {
     }
     let limit = threshold * threshold;
     let mut random = SplitMix64::new(seed ^ 0x5bd1_e995);
-    let mut most = 0;
+    let agreeing = |map: &Matrix3<f64>| -> Vec<&Pair> {
+        let near = |pair: &&&Pair| {
+            let to = map * homogeneous(pair[0]);
+            let (dx, dy) = (to.x / to.z - pair[1][0], to.y / to.z - pair[1][1]);
+            dx * dx + dy * dy < limit
+        };
+        pairs.iter().filter(near).copied().collect()
+    };
+    let mut most: Vec<&Pair> = Vec::new();
     for _ in 0..200 {
         let four = [(); 4].map(|()| pairs[random.range(0, pairs.len() as i32) as usize]);
-        let Some(map) = homography(&four) else { continue };
-        let count = pairs
-            .iter()
-            .filter(|pair| {
-                let to = map * homogeneous(pair[0]);
-                let (dx, dy) = (to.x / to.z - pair[1][0], to.y / to.z - pair[1][1]);
-                dx * dx + dy * dy < limit
-            })
-            .count();
-        most = most.max(count);
+        let Some(found) = homography(&four).map(|map| agreeing(&map)) else { continue };
+        if found.len() > most.len() {
+            most = found;
+        }
     }
-    most as f64 / pairs.len() as f64
+    // Four noisy points do not carry a map far: least squares over those that agree does.
+    for _ in 0..4 {
+        let Some(found) = homography(&most).map(|map| agreeing(&map)) else { break };
+        if found.len() <= most.len() {
+            break;
+        }
+        most = found;
+    }
+    most.len() as f64 / pairs.len() as f64
 }
 
-fn homography(pairs: &[&Pair; 4]) -> Option<Matrix3<f64>> {
-    let mut matrix = nalgebra::SMatrix::<f64, 8, 8>::zeros();
-    let mut right = nalgebra::SVector::<f64, 8>::zeros();
-    for (number, [[x, y], [u, v]]) in pairs.iter().map(|pair| **pair).enumerate() {
-        matrix.row_mut(2 * number).copy_from_slice(&[x, y, 1.0, 0.0, 0.0, 0.0, -u * x, -u * y]);
-        matrix.row_mut(2 * number + 1).copy_from_slice(&[0.0, 0.0, 0.0, x, y, 1.0, -v * x, -v * y]);
-        right[2 * number] = u;
-        right[2 * number + 1] = v;
+/// By linear least squares with `h33 = 1`; exact for four pairs.
+fn homography(pairs: &[&Pair]) -> Option<Matrix3<f64>> {
+    let mut equations = NormalEquations::<8>::new();
+    for [[x, y], [u, v]] in pairs.iter().map(|pair| **pair) {
+        equations.add(&[x, y, 1.0, 0.0, 0.0, 0.0, -u * x, -u * y], u, 1.0);
+        equations.add(&[0.0, 0.0, 0.0, x, y, 1.0, -v * x, -v * y], v, 1.0);
     }
-    let h = matrix.lu().solve(&right)?;
-    let map = Matrix3::new(h[0], h[1], h[2], h[3], h[4], h[5], h[6], h[7], 1.0);
+    let &[a, b, c, d, e, f, g, h] = equations.solve()?;
+    let map = Matrix3::new(a, b, c, d, e, f, g, h, 1.0);
     map.iter().all(|entry| entry.is_finite()).then_some(map)
 }
 

@@ -79,6 +79,13 @@ struct Row {
     compare_second: f64,
 }
 
+impl Row {
+    /// The ratio of the stage that tells less: shape by corners alone is clear already, and appearance needs points.
+    fn weaker(&self) -> f64 {
+        self.signal_to_noise.min(self.intensity_signal_to_noise)
+    }
+}
+
 /// Runs the study.
 ///
 /// # Errors
@@ -111,8 +118,8 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
         levels.push(study(level, &bases, &tests, &bar)?);
     }
     bar.finish_and_clear();
-    let most = levels.iter().map(|level| level.signal_to_noise).fold(0.0, f64::max);
-    let picked = levels.iter().find(|level| level.signal_to_noise >= ENOUGH * most).map_or(0, |level| level.level);
+    let most = levels.iter().map(Row::weaker).fold(0.0, f64::max);
+    let picked = levels.iter().find(|level| level.weaker() >= ENOUGH * most).map_or(0, |level| level.level);
     let document = Document {
         schema_version: SCHEMA_VERSION,
         program_version: env!("CARGO_PKG_VERSION"),
@@ -237,7 +244,7 @@ fn text(document: &Document) -> String {
     }
     let _ = writeln!(
         text,
-        "picked: level {}, the first with at least {:.0} % of the largest signal-to-noise ratio of the shape",
+        "picked: level {}, the first with at least {:.0} % of the largest signal-to-noise ratio; of both the lower counts",
         document.picked_level,
         ENOUGH * 100.0
     );
