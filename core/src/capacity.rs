@@ -12,6 +12,10 @@
 //! processor at hand. The frame itself is the camera's and not counted.
 
 use crate::extract::{Extractor, FeatureSet, FrontEnd};
+use crate::geometry::HullLayers;
+use crate::geometry::correspond::Correspond;
+use crate::geometry::proposal::MOST_PAIRS;
+use crate::geometry::shift::{LayerQuad, quads_of};
 use crate::profile::Profile;
 use crate::pyramid::level_bytes;
 use crate::recognizer::Recognizer;
@@ -39,6 +43,26 @@ pub type HandheldFeatures = FeatureSet<HANDHELD_FEATURES>;
 
 /// Recognizes [`HandheldFeatures`] by a table of [`Profile::Handheld`].
 pub type HandheldRecognizer = Recognizer<STORED, { 2 * STORED }, 0, HANDHELD_FEATURES>;
+
+/// Corners of a view that a device matches by their places alone, at most: those of the thesis' figure 5, and one more.
+pub const HANDHELD_CORNERS: usize = 48;
+
+/// The nested hulls of [`HANDHELD_CORNERS`]; always enough layers.
+pub type HandheldHullLayers = HullLayers<HANDHELD_CORNERS, { HANDHELD_CORNERS / 3 }>;
+
+/// Proposals that [`HandheldCorrespond`] keeps of each source.
+const PROPOSALS: usize = 96;
+
+/// Matches [`HANDHELD_CORNERS`] of two views by nested hulls, in steps of its own: see [`HANDHELD_CORRESPOND_BYTES`]. Local
+/// arrangements want 60 entries of scratch memory for each corner, which is more than all the rest.
+pub type HandheldCorrespond =
+    Correspond<HANDHELD_CORNERS, { HANDHELD_CORNERS / 3 }, PROPOSALS, { PROPOSALS * MOST_PAIRS }>;
+
+/// Quads of all layers of two views: the scratch memory of [`HandheldCorrespond`].
+pub const HANDHELD_QUADS: usize = quads_of(2 * HANDHELD_CORNERS);
+
+/// Bytes that matching by nested hulls takes: [`HandheldCorrespond`] and its scratch memory.
+pub const HANDHELD_CORRESPOND_BYTES: usize = size_of::<HandheldCorrespond>() + HANDHELD_QUADS * size_of::<LayerQuad>();
 
 /// Bytes of memory on the processor that this is compiled for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -90,3 +114,6 @@ impl HandheldMemory {
 
 // The whole of it fits 64 KB beside the frame, on this very processor.
 const _: () = assert!(HandheldMemory::of_frame(320, 240).peak() <= 64 * 1_024);
+
+// So does matching, beside the features.
+const _: () = assert!(HANDHELD_CORRESPOND_BYTES + size_of::<HandheldFeatures>() <= 64 * 1_024);

@@ -67,10 +67,11 @@ sections() {
 # The bytes of each part as this target's compiler lays them out.
 memory() {
     place=$(readelf -SW "$1" | sed -n 's/.*\.memory_table *PROGBITS *[0-9a-f]* *\([0-9a-f]*\) .*/\1/p')
-    od -An -v -tu4 -w24 -j "$((0x$place))" -N 24 "$1" | awk '{
+    od -An -v -tu4 -w28 -j "$((0x$place))" -N 28 "$1" | awk '{
         first = $1 + $2 + $3; second = $4 + $5 + $6 + $3
         printf "  memory: features %d; first step: levels %d, extractor %d, in all %d", $3, $1, $2, first
         printf "; second step: distances %d, record %d, recognizer %d, in all %d\n", $4, $5, $6, second
+        printf "  matching by nested hulls: %d, with the features %d\n", $7, $7 + $3
         printf "  peak of the memory: %d of 65536 bytes\n", (first > second ? first : second)
     }'
 }

@@ -51,39 +51,61 @@ impl AffineEpipolar {
     }
 }
 
+/// A symmetric matrix on its way to a diagonal one, and the axes that it has then, one a column.
+struct Turned {
+    matrix: [[f64; 4]; 4],
+    axes: [[f64; 4]; 4],
+}
+
+impl Turned {
+    /// Turns the plane of two axes so that the entry `P`, `Q` vanishes. The indices are constants: none is checked.
+    fn turn<const P: usize, const Q: usize>(&mut self) {
+        let Self { matrix: a, axes } = self;
+        if a[P][Q] == 0.0 {
+            return;
+        }
+        let theta = (a[Q][Q] - a[P][P]) / (2.0 * a[P][Q]);
+        let root = sqrt_f64(theta * theta + 1.0);
+        let tangent = if theta < 0.0 { -1.0 / (root - theta) } else { 1.0 / (root + theta) };
+        let cosine = 1.0 / sqrt_f64(tangent * tangent + 1.0);
+        let sine = tangent * cosine;
+        let turned = |x: f64, y: f64| (cosine * x - sine * y, sine * x + cosine * y);
+        for row in a.iter_mut() {
+            (row[P], row[Q]) = turned(row[P], row[Q]);
+        }
+        let [mut upper, mut lower] = [a[P], a[Q]];
+        for (x, y) in upper.iter_mut().zip(&mut lower) {
+            (*x, *y) = turned(*x, *y);
+        }
+        (a[P], a[Q]) = (upper, lower);
+        for row in axes {
+            (row[P], row[Q]) = turned(row[P], row[Q]);
+        }
+    }
+}
+
 /// The unit eigenvector of the smallest eigenvalue of a symmetric matrix: Jacobi rotations in a fixed order
 /// (Golub and Van Loan, Matrix Computations, 8.5).
-fn smallest_axis(mut a: [[f64; 4]; 4]) -> [f64; 4] {
-    const PLANES: [(usize, usize); 6] = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)];
-    let mut axes = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]];
+fn smallest_axis(matrix: [[f64; 4]; 4]) -> [f64; 4] {
+    let axes = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]];
+    let mut turned = Turned { matrix, axes };
     // Four by four converges in five sweeps to the last bit.
     for _ in 0..8 {
-        for (p, q) in PLANES {
-            if a[p][q] == 0.0 {
-                continue;
-            }
-            let theta = (a[q][q] - a[p][p]) / (2.0 * a[p][q]);
-            let root = sqrt_f64(theta * theta + 1.0);
-            let tangent = if theta < 0.0 { -1.0 / (root - theta) } else { 1.0 / (root + theta) };
-            let cosine = 1.0 / sqrt_f64(tangent * tangent + 1.0);
-            let sine = tangent * cosine;
-            for row in &mut a {
-                (row[p], row[q]) = (cosine * row[p] - sine * row[q], sine * row[p] + cosine * row[q]);
-            }
-            let (upper, lower) = (a[p], a[q]);
-            for (k, (x, y)) in upper.into_iter().zip(lower).enumerate() {
-                (a[p][k], a[q][k]) = (cosine * x - sine * y, sine * x + cosine * y);
-            }
-            for row in &mut axes {
-                (row[p], row[q]) = (cosine * row[p] - sine * row[q], sine * row[p] + cosine * row[q]);
-            }
+        turned.turn::<0, 1>();
+        turned.turn::<0, 2>();
+        turned.turn::<0, 3>();
+        turned.turn::<1, 2>();
+        turned.turn::<1, 3>();
+        turned.turn::<2, 3>();
+    }
+    let Turned { matrix: a, axes } = turned;
+    let mut least = (a[0][0], axes.map(|row| row[0]));
+    for (value, axis) in
+        [(a[1][1], axes.map(|row| row[1])), (a[2][2], axes.map(|row| row[2])), (a[3][3], axes.map(|row| row[3]))]
+    {
+        if value < least.0 {
+            least = (value, axis);
         }
     }
-    let mut least = 0;
-    for axis in 1..4 {
-        if a[axis][axis] < a[least][least] {
-            least = axis;
-        }
-    }
-    axes.map(|row| row[least])
+    least.1
 }

@@ -15,6 +15,7 @@ mod device;
 mod enroll;
 mod nest;
 mod outcome;
+mod pairs;
 mod recognize;
 #[cfg_attr(target_os = "none", path = "start_bare.rs")]
 #[cfg_attr(not(target_os = "none"), path = "start_host.rs")]
@@ -22,7 +23,9 @@ mod start;
 mod position;
 mod views;
 
-use daymark_core::capacity::{HANDHELD_FRONT_END, HandheldExtractor, HandheldFeatures, HandheldMemory};
+use daymark_core::capacity::{
+    HANDHELD_CORRESPOND_BYTES, HANDHELD_FRONT_END, HandheldExtractor, HandheldFeatures, HandheldMemory,
+};
 use daymark_core::image::GrayView;
 use daymark_core::kernel::Portable;
 use daymark_core::tone::TonedFrame;
@@ -40,19 +43,21 @@ const STACK: usize = 64 * 1_024;
 const CALLS: usize = 2 * 1_024;
 const _: () = assert!(MEMORY.peak() + CALLS <= STACK);
 
-/// [`MEMORY`] where `check.sh` finds it: levels, extractor, features, distances, record, recognizer.
+/// [`MEMORY`] where `check.sh` finds it: levels, extractor, features, distances, record, recognizer, and matching
+/// by nested hulls.
 #[used]
 #[unsafe(link_section = ".memory_table")]
-static MEMORY_TABLE: [u32; 6] = [
+static MEMORY_TABLE: [u32; 7] = [
     MEMORY.levels as u32,
     MEMORY.extractor as u32,
     MEMORY.features as u32,
     MEMORY.distances as u32,
     MEMORY.record as u32,
     MEMORY.recognizer as u32,
+    HANDHELD_CORRESPOND_BYTES as u32,
 ];
 
-/// One round: the geometry of views, then see, enroll, recognize.
+/// One round: the geometry of views, then see, nest and match corners, enroll, recognize.
 #[inline(never)]
 fn run(device: &mut Device) -> Result<Outcome, Failure> {
     let mut features = HandheldFeatures::new();
@@ -62,6 +67,9 @@ fn run(device: &mut Device) -> Result<Outcome, Failure> {
     see(device, &mut features)?;
     if !nest::nest(features.view())? {
         return Err(Failure::Nesting);
+    }
+    if !pairs::check(features.view())? {
+        return Err(Failure::Pairs);
     }
     enroll::enroll(features.view(), device.table())?;
     #[cfg(feature = "control")]

@@ -36,6 +36,8 @@ pub enum Failure {
     Geometry(GeometryError),
     /// The layers of hulls are not what they should be.
     Nesting,
+    /// Corners are not found again in another view.
+    Pairs,
     /// The frame shows nothing.
     Blank,
     /// The flash pages are full.
