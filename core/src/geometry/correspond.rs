@@ -37,8 +37,8 @@ const LEAST_RELIEF_GAIN: f64 = 0.8;
 const WITNESSES: f64 = 2.0;
 /// The same for an answer that explains [`WHOLE`] of the corners.
 const FEW_WITNESSES: f64 = 1.0;
-/// Corners closer than this to another one, in 1/16 px, are not matched across relief, which may move them as far.
-const CROWDED: i32 = 3 * 16;
+/// Corners closer than this to an unmatched one, in 1/16 px, are not matched across relief, which may move them as far.
+const CROWDED: i64 = 5 * 16;
 /// Fits of the epipolar constraint, each without what the one before found off.
 const ROUNDS: usize = 4;
 
@@ -235,14 +235,7 @@ impl<const POINTS: usize, const LAYERS: usize, const PROPOSALS: usize, const CAN
     /// The pairs that neighbours support and the epipolar constraint allows; `None` if they are too few or contradict.
     fn relief(&mut self, first: &[ImagePoint], second: &[ImagePoint]) -> Option<Explanation> {
         self.support();
-        let alone = |points: &[ImagePoint], number: u16| {
-            let here = points.get(usize::from(number)).copied().unwrap_or_default();
-            !(0_u16..).zip(points).any(|(other, point)| {
-                let (x, y) = (point.x - here.x, point.y - here.y);
-                other != number && x * x + y * y < CROWDED * CROWDED
-            })
-        };
-        self.supported.retain(|supported| alone(first, supported.pair.first) && alone(second, supported.pair.second));
+        self.drop_crowded(first, second);
         let chosen = self.supported.len();
         let place = |points: &[ImagePoint], number: u16| {
             points.get(usize::from(number)).copied().unwrap_or_default().to_pixels().map(f64::from)
@@ -283,6 +276,26 @@ impl<const POINTS: usize, const LAYERS: usize, const PROPOSALS: usize, const CAN
             let _ = self.found.push(Correspondence { pair: supported.pair, residual });
         }
         Some(Explanation::Relief { epipolar, median })
+    }
+
+    /// Drops pairs with a corner that has another one nearby which is not matched: it may be the other's partner.
+    fn drop_crowded(&mut self, first: &[ImagePoint], second: &[ImagePoint]) {
+        let near = |points: &[ImagePoint], number: u16, matched: &dyn Fn(u16) -> bool| {
+            let here = points.get(usize::from(number)).copied().unwrap_or_default();
+            (0_u16..).zip(points).any(|(other, point)| {
+                let (x, y) = (i64::from(point.x) - i64::from(here.x), i64::from(point.y) - i64::from(here.y));
+                other != number && x * x + y * y < CROWDED * CROWDED && !matched(other)
+            })
+        };
+        self.distances.clear();
+        for Supported { pair, .. } in &self.supported {
+            let of_first = |other: u16| self.supported.iter().any(|supported| supported.pair.first == other);
+            let of_second = |other: u16| self.supported.iter().any(|supported| supported.pair.second == other);
+            let crowded = near(first, pair.first, &of_first) || near(second, pair.second, &of_second);
+            let _ = self.distances.push(f64::from(u8::from(crowded)));
+        }
+        let mut crowded = self.distances.iter();
+        self.supported.retain(|_| crowded.next().is_some_and(|crowded| *crowded == 0.0));
     }
 
     /// Drops pairs with fewer than `least` proposals all of whose pairs still stand.
