@@ -1,6 +1,5 @@
 //! `daymark correspond` from the outside: committed corners, made corners, broken files.
 
-#[allow(dead_code, reason = "other tests need the rest of it")]
 mod support;
 
 use std::fmt::Write as _;
