@@ -19,28 +19,28 @@ two.csv: 51 corners in 6 layers (10, 12, 8, 10, 6, 5)
 of 47 numbers in both files 6 are matched rightly; 16 matches are wrong
 
    first  second      layers  shift  found by        residual
-      38      38       0 → 0     +0  layers                 -
-      39      39       0 → 0     +0  layers                 -
-    1009    1205       1 → 1     +8  layers                 -
-    1010    1010       0 → 0     +0  layers                 -
+      15    1010       0 → 0     +3  layers                 -
+      27    1054       0 → 0     +3  layers                 -
+      37    1058       0 → 0     +3  layers                 -
+      42    1214       1 → 1     +9  layers                 -
+      43      43       3 → 3     +9  layers                 -
+    1009    1206       1 → 1     +9  layers                 -
     1011    1045       4 → 4     +2  layers                 -
+    1012    1012       3 → 3     +9  layers                 -
     1037    1060       2 → 2     +5  layers                 -
     1038    1049       2 → 2     +5  layers                 -
     1045    1243       2 → 2     +5  layers                 -
     1046    1037       2 → 2     +5  layers                 -
-    1050      14       1 → 1     +8  layers                 -
-    1051    1013       3 → 3     +2  layers                 -
+    1051    1051       3 → 3     +9  layers                 -
     1052    1029       4 → 4     +2  layers                 -
-    1059    1202       1 → 1     +8  layers                 -
+    1058      39       0 → 0     +3  layers                 -
     1061    1077       4 → 4     +2  layers                 -
     1065    1011       4 → 4     +2  layers                 -
-    1066      43       3 → 3     +2  layers                 -
-    1077    1051       3 → 3     +2  layers                 -
-    1081    1012       3 → 3     +2  layers                 -
+    1066    1066       3 → 3     +9  layers                 -
     1082    1082       2 → 2     +5  layers                 -
     1093    1093       2 → 2     +5  layers                 -
-    1094    1197       1 → 1     +8  layers                 -
-    1242    1242       0 → 0     +0  layers                 -
+    1193    1094       1 → 1     +9  layers                 -
+    1197    1059       1 → 1     +9  layers                 -
 
 quads of the first picture's layers: 47
      6 matched
