@@ -4,7 +4,7 @@
 //! faster). On a busy machine only the ratios say anything.
 
 // The file itself, so that the whole command line need not be built for it.
-#[allow(dead_code)]
+#[allow(dead_code, reason = "the bench times the search, and takes nothing else of the file")]
 #[path = "../../../runner-linux/src/classify/nearest.rs"]
 mod nearest;
 
