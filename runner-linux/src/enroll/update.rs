@@ -74,6 +74,7 @@ pub fn apply(table: &mut OwnedTable, plan: Plan, pictures: Vec<Picture>, replace
             kind: plan.kind.unwrap_or(KIND),
             position: None,
             views: Vec::new(),
+            model: None,
         };
         table.landmarks.push(entry);
         table.landmarks.len() - 1
