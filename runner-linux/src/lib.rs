@@ -16,6 +16,7 @@ mod cut_jpeg;
 pub mod simd;
 pub mod engine;
 pub mod camera_file;
+pub mod lens_source;
 pub mod synthesize;
 pub mod classify;
 pub mod model_file;
