@@ -167,6 +167,7 @@ fn recognize_all(
             read_ms: ms(begin, read),
             features_ms: ms(read, extracted),
             matching_ms: ms(extracted, matched),
+            position_ms: 0.0,
         });
         let best = match &recognition.best {
             Some(best) => ViewExplanation::new(&mut engine, &table, best)?,
