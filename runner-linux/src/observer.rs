@@ -37,9 +37,25 @@ pub struct Observer {
     /// In the model's frame.
     pub place: Place,
     /// On Earth; `None` if the table does not know where the landmark stands.
-    pub fix: Option<Fix>,
+    pub fix: Option<Sighted>,
     /// What keeps the fix from being better, each with what to do.
     pub lacking: Vec<String>,
+}
+
+/// A fix, and how much of its error is noise.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sighted {
+    /// With everything that it may be wrong by.
+    pub fix: Fix,
+    /// The same with the noise of the frame's corners alone, as if lens, model and map were exact: what differs from frame to
+    /// frame.
+    pub noise: Fix,
+}
+
+impl Sighted {
+    const fn all_noise(fix: Fix) -> Self {
+        Self { fix, noise: fix }
+    }
 }
 
 /// In the model's frame.
@@ -47,8 +63,10 @@ pub struct Observer {
 pub enum Place {
     /// The camera's pose.
     Pose {
-        /// The pose.
+        /// The pose, with the error of lens and scale in its covariance.
         located: Box<Located>,
+        /// The pose with the noise of the corners alone.
+        noise: Box<Pose>,
         /// Whether its lengths are metres.
         metric: bool,
     },
@@ -100,7 +118,7 @@ impl Locating {
                 .lacking
                 .push("the table has no model of it: enroll two or more pictures from different places".to_owned());
             let reach = near(landmark.kind, size, lens).map_or(reach_m, |reach| reach.min(reach_m));
-            observer.fix = landmark.position.map(|at| site(at, None).near(reach));
+            observer.fix = landmark.position.map(|at| Sighted::all_noise(site(at, None).near(reach)));
             return Ok(observer);
         };
         let matched = Matched::new(engine, table, landmark.views.start, &model, lens)?;
@@ -127,16 +145,22 @@ impl Locating {
             let site = site(at, Some(&model));
             let known = facts.azimuth.is_some();
             match &place {
-                Place::Pose { located, metric: true } if known && located.pose.rival.is_none() => {
-                    site.fix(&located.pose)
-                }
+                Place::Pose { located, noise, metric: true } if known && located.pose.rival.is_none() => Sighted {
+                    fix: site.fix(&located.pose),
+                    noise: Site::exact(site.position, site.azimuth_deg).fix(noise),
+                },
                 // On one of two sides, or on a circle: no farther than this.
-                Place::Pose { located, metric: true } => {
+                Place::Pose { located, metric: true, .. } => {
                     let range = located.pose.range() + 2.0 * located.pose.deviation();
-                    site.near(range.min(reach_m))
+                    Sighted::all_noise(site.near(range.min(reach_m)))
                 }
-                Place::Direction(direction) if known && facts.scale_error.is_some() => site.fix_without_lens(direction),
-                _ => site.near(near(landmark.kind, matched.size_px, lens).map_or(reach_m, |reach| reach.min(reach_m))),
+                Place::Direction(direction) if known && facts.scale_error.is_some() => {
+                    Sighted::all_noise(site.fix_without_lens(direction))
+                }
+                _ => {
+                    let reach = near(landmark.kind, matched.size_px, lens).map_or(reach_m, |reach| reach.min(reach_m));
+                    Sighted::all_noise(site.near(reach))
+                }
             }
         });
         Ok(Observer { place, fix, lacking })
@@ -176,7 +200,11 @@ impl Locating {
             Ok(located) => {
                 let share = libm::hypot(lens.relative_error, scale_error.unwrap_or(0.0));
                 let pose = located.pose.with_range_error(share);
-                Place::Pose { located: Box::new(Located { pose, ..located }), metric: scale_error.is_some() }
+                Place::Pose {
+                    located: Box::new(Located { pose, ..located }),
+                    noise: Box::new(located.pose),
+                    metric: scale_error.is_some(),
+                }
             }
             Err(why) => Place::NoPose(why),
         }
@@ -311,13 +339,5 @@ pub fn site(at: GeoPosition, model: Option<&StoredModel<'_>>) -> Site {
         // "Within" is taken as two deviations of each coordinate.
         deviation_m: f64::from(at.error_dm) / 10.0 / 2.0,
         azimuth_deviation_deg: azimuth.map_or(180.0, |azimuth| f64::from(azimuth.deviation) / 100.0),
-    }
-}
-
-/// Of a pose: the pose itself, for reports.
-pub const fn pose_of(place: &Place) -> Option<&Pose> {
-    match place {
-        Place::Pose { located, .. } => Some(&located.pose),
-        _ => None,
     }
 }

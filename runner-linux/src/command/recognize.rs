@@ -59,7 +59,7 @@ pub struct Args {
 }
 
 /// A building is recognized from this far at most, if nobody says otherwise, metres.
-pub(super) const REACH_M: f64 = 200.0;
+pub(super) const REACH_M: f64 = 100.0;
 
 /// A reach on the command line.
 ///
@@ -230,7 +230,7 @@ impl Looking<'_> {
             let observer = locating.observer(engine, &table, answer, &lens, args.reach)?;
             finding.observer = Some(ObserverFacts::new(&observer, &lens));
             if let (Some(file), Some(fix)) = (map, observer.fix) {
-                draw_map(file, &table, answer, fix)?;
+                draw_map(file, &table, answer, fix.fix)?;
                 finding.map_file = Some(file.to_string_lossy().into_owned());
             }
         }

@@ -59,7 +59,8 @@ impl Building {
 fn hull(points: &[[f64; 2]]) -> Vec<[f64; 2]> {
     let centimetres = |metres: f64| libm::round(metres * 100.0) as i32;
     let places: Vec<_> = points.iter().map(|[x, y]| ImagePoint::new(centimetres(*x), centimetres(*y))).collect();
-    match Box::new(ConvexHull::<{ POINTS_LIMIT as usize }>::new()).enclose(&places) {
+    let mut hull = Box::new(ConvexHull::<{ POINTS_LIMIT as usize }>::new());
+    match hull.enclose(&places) {
         Ok(Hull::Polygon(numbers)) => numbers.iter().map(|number| points[usize::from(*number)]).collect(),
         _ => Vec::new(),
     }

@@ -65,12 +65,12 @@ impl ObserverFacts {
     /// What is said about an observer.
     pub fn new(observer: &Observer, lens: &KnownLens) -> Self {
         let (pose, interval) = match &observer.place {
-            Place::Pose { located, metric } => (Some(PoseFacts::new(&located.pose, *metric)), None),
+            Place::Pose { located, metric, .. } => (Some(PoseFacts::new(&located.pose, *metric)), None),
             Place::Direction(direction) => (None, Some(direction.range_m)),
             Place::NoPose(_) | Place::NoModel => (None, None),
         };
         Self {
-            fix: observer.fix.as_ref().map(Fix::of),
+            fix: observer.fix.as_ref().map(|sighted| Fix::of(&sighted.fix)),
             pose,
             range_interval_m: interval,
             lens: LensFacts { source: lens.source, focal_px: lens.lens.focal[0], relative_error: lens.relative_error },
