@@ -238,7 +238,8 @@ fn a_mirrored_picture_is_told_by_its_towers() {
 fn what_cannot_be_used_is_an_error_and_nothing_is_written() {
     let town = Town::new();
     let mut pictures = whole(&town, 3);
-    calibrate(&town, &pictures, &["-o", "no/such/camera.yaml"]);
+    let ran = calibrate(&town, &pictures, &["-o", "no/such/camera.yaml"]);
+    ran.refused(&["cannot write no/such/camera.yaml", "make the folder first"]);
     let ran = calibrate(&town, &pictures, &["-o", "same.yaml", "--ros", "same.yaml"]);
     ran.refused(&["-o and --ros name the same file"]);
     calibrate(&town, &pictures, &["--board", "2x9"]).refused_by_the_parser("write inner corners as in 9x6");

@@ -342,6 +342,10 @@ fn size_of(lattice: &Lattice, board: &Board) -> NoBoard {
         let most = lines.values().copied().max().unwrap_or(0);
         lines.values().filter(|count| 2 * **count > most).count() as u32
     };
+    // Windows and tiles make small lattices.
+    if lattice.places.len() < FEWEST_CORNERS.max(board.corners() / 4) {
+        return NoBoard::Nothing { crossings: lattice.places.len() };
+    }
     let (a, b) = (full(&columns), full(&rows));
     let found = [a.max(b), a.min(b)];
     let told = [board.columns.max(board.rows), board.columns.min(board.rows)].map(u32::from);

@@ -29,6 +29,15 @@ impl Plane {
         Self { width, height, pixels }
     }
 
+    /// The pixels from `left`, `top` on, as many as there are of `width` x `height`.
+    pub(super) fn part(gray: &GrayImage, [left, top]: [usize; 2], width: usize, height: usize) -> Self {
+        let width = width.min(gray.width.saturating_sub(left));
+        let rows = gray.pixels.chunks_exact(gray.width).skip(top).take(height);
+        let height = rows.len();
+        let pixels = rows.flat_map(|row| row.iter().skip(left).take(width).map(|&pixel| f32::from(pixel))).collect();
+        Self { width, height, pixels }
+    }
+
     /// Smoothed by (1 4 6 4 1) / 16 along both axes: a Gaussian of one pixel.
     pub(super) fn smoothed(&self) -> Self {
         let weigh = |a: f32, b: f32, c: f32, d: f32, e: f32| ((a + e) + 4.0 * (b + d) + 6.0 * c) * (1.0 / 16.0);

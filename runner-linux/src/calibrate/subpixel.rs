@@ -5,34 +5,59 @@
 //! `cornerSubPix`). Noise has no direction and cancels in a window that is centred on the answer, so it is found again from
 //! each answer until it stands.
 
+use super::plane::Plane;
 use crate::picture::GrayImage;
 
 /// Rounds at most.
-const ROUNDS: usize = 40;
+const ROUNDS: usize = 100;
 /// It stands if it moves less, pixels.
-const STANDS: f64 = 1e-4;
+const STANDS: f64 = 1e-5;
+
+/// How often pixels are smoothed by a Gaussian of 1 px before gradients are taken, for windows of at least this reach: noise of
+/// single pixels is the largest part of a gradient in dim and blurred pictures, and a larger window has room for wider edges.
+const SMOOTHING: [(f64, usize); 4] = [(9.0, 4), (7.0, 3), (5.0, 2), (3.5, 1)];
 
 /// The crossing near `start`, by the pixels within `reach`; `None` if it is too near the border, if there is none, or if it
 /// is farther away than half the window.
 pub(super) fn crossing(gray: &GrayImage, start: [f64; 2], reach: f64) -> Option<[f64; 2]> {
+    let farthest = (0.5 * reach).max(1.5);
+    let rounds = SMOOTHING.iter().find(|(least, _)| reach >= *least).map_or(0, |(_, rounds)| *rounds);
+    let room = reach + farthest + 2.0 * rounds as f64 + 2.0;
+    let first = start.map(|at| libm::floor(at - room).max(0.0));
+    let side = libm::ceil(2.0 * room) as usize + 2;
+    let mut part = Plane::part(gray, first.map(|at| at as usize), side, side);
+    if part.width < 3 || part.height < 3 {
+        return None;
+    }
+    for _ in 0..rounds {
+        part = part.smoothed();
+    }
+    let start = [start[0] - first[0], start[1] - first[1]];
     let mut at = start;
+    let mut before: Option<[f64; 2]> = None;
     for _ in 0..ROUNDS {
-        let next = better(gray, at, reach)?;
-        let moved = (next[0] - at[0]).abs() + (next[1] - at[1]).abs();
+        let next = better(&part, at, reach)?;
+        let step = [next[0] - at[0], next[1] - at[1]];
         at = next;
-        if !((at[0] - start[0]).abs().max((at[1] - start[1]).abs()) < (0.5 * reach).max(1.5)) {
+        // Steps shrink evenly, the slower the more the middle of the window is blurred: after two of them their sum is known.
+        let ratio = before.map_or(0.0, |b| (b[0] * step[0] + b[1] * step[1]) / (b[0] * b[0] + b[1] * b[1]));
+        let rest = if (0.1..0.995).contains(&ratio) { ratio / (1.0 - ratio) } else { 0.0 };
+        let jump = step.map(|s| (s * rest).clamp(-0.5, 0.5));
+        at = [at[0] + jump[0], at[1] + jump[1]];
+        before = (rest == 0.0).then_some(step);
+        if !((at[0] - start[0]).abs().max((at[1] - start[1]).abs()) < farthest) {
             return None;
         }
-        if moved < STANDS {
+        if step[0].abs() + step[1].abs() < STANDS {
             break;
         }
     }
-    Some(at)
+    Some([at[0] + first[0], at[1] + first[1]])
 }
 
-fn better(gray: &GrayImage, [x, y]: [f64; 2], reach: f64) -> Option<[f64; 2]> {
+fn better(part: &Plane, [x, y]: [f64; 2], reach: f64) -> Option<[f64; 2]> {
     let inside = |low: f64, high: f64, length: usize| low >= 1.0 && high <= length as f64 - 2.0;
-    if !inside(x - reach, x + reach, gray.width) || !inside(y - reach, y + reach, gray.height) {
+    if !inside(x - reach, x + reach, part.width) || !inside(y - reach, y + reach, part.height) {
         return None;
     }
     let first = |centre: f64| libm::ceil(centre - reach) as usize;
@@ -44,13 +69,12 @@ fn better(gray: &GrayImage, [x, y]: [f64; 2], reach: f64) -> Option<[f64; 2]> {
     };
     let (mut xx, mut xy, mut yy, mut bx, mut by) = (0.0, 0.0, 0.0, 0.0, 0.0);
     for v in first(y)..=last(y) {
-        let row = |v: usize| gray.pixels.get(v * gray.width..(v + 1) * gray.width);
-        let (above, here, below) = (row(v - 1)?, row(v)?, row(v + 1)?);
+        let (above, here, below) = (part.row(v - 1), part.row(v), part.row(v + 1));
         let dy = v as f64 - y;
         for u in first(x)..=last(x) {
             let dx = u as f64 - x;
-            let gx = f64::from(*here.get(u + 1)?) - f64::from(*here.get(u - 1)?);
-            let gy = f64::from(*below.get(u)?) - f64::from(*above.get(u)?);
+            let gx = f64::from(here[u + 1]) - f64::from(here[u - 1]);
+            let gy = f64::from(below[u]) - f64::from(above[u]);
             let w = weight(dx) * weight(dy);
             let (wxx, wxy, wyy) = (w * gx * gx, w * gx * gy, w * gy * gy);
             xx += wxx;
