@@ -14,7 +14,7 @@ use crate::synthesize::view::View;
 const METRES_PER_DEGREE: f64 = 111_195.0;
 
 /// The lens of each picture (for its own size), and the places if they are known.
-pub(super) fn cameras(
+pub(in crate::command) fn cameras(
     images: &[PathBuf],
     sizes: &[[u32; 2]],
     files: &[PathBuf],
