@@ -120,6 +120,23 @@ fn a_plain_chessboard_gives_the_lens_and_files_that_others_read() {
 }
 
 #[test]
+fn large_pictures_give_the_same_lens_in_their_pixels() {
+    let town = Town::new();
+    let studio = Studio::new(lens(), BOARD);
+    let pictures: Vec<String> = (0..6)
+        .map(|number| {
+            let small = studio.picture(&shot(WHOLE[number], false, number));
+            let name = format!("{number}.pgm");
+            save(&town, &name, &small.scaled_to(2560));
+            name
+        })
+        .collect();
+    let document = calibrate(&town, &pictures, &["--json"]).succeeded().json();
+    let found = document["lens"]["parameters"][0]["value"].as_f64().expect("a number");
+    assert!((found / (4.0 * lens().focal[0]) - 1.0).abs() < 0.003, "{document:#}");
+}
+
+#[test]
 fn the_threads_change_nothing() {
     let town = Town::new();
     let pictures = whole(&town, 5);

@@ -226,7 +226,7 @@ pub fn solve(
             let tilt = libm::acos(shot.pose.view_from_model[(2, 2)].abs().min(1.0)).to_degrees();
             fates[picture.number] = used(picture, &shot.seen, rms_px, tilt);
         }
-        return (judged(&model, &shots, fit, largest_tilt_degrees, &fates), fates);
+        return (judged(&model, &shots, &fit, largest_tilt_degrees, &fates), fates);
     }
     (Err(NoCalibration::TooFewPictures { usable: 0, given }), fates)
 }
@@ -240,7 +240,7 @@ fn used(picture: &Picture<'_>, seen: &[Seen], rms_px: f64, tilt_degrees: f64) ->
 fn judged(
     model: &Model,
     shots: &[Shot],
-    fit: Fit,
+    fit: &Fit,
     largest_tilt_degrees: f64,
     fates: &[Fate],
 ) -> Result<Calibration, NoCalibration> {

@@ -103,14 +103,18 @@ pub(super) fn sample(number: usize) -> [f64; 2] {
 /// Takes away mean and length; `None` for a square without a picture in it.
 pub(super) fn normalized(mut values: Patch) -> Option<Patch> {
     let mean = values.iter().sum::<f32>() / SAMPLES as f32;
-    values.iter_mut().for_each(|value| *value -= mean);
+    for value in &mut values {
+        *value -= mean;
+    }
     let squares = values.iter().map(|value| value * value).sum::<f32>();
     // Three gray levels of deviation.
     if !(squares > 9.0 * SAMPLES as f32) {
         return None;
     }
     let scale = 1.0 / libm::sqrtf(squares);
-    values.iter_mut().for_each(|value| *value *= scale);
+    for value in &mut values {
+        *value *= scale;
+    }
     Some(values)
 }
 

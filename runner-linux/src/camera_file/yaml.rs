@@ -149,26 +149,24 @@ pub fn text(lens: &Lens, form: Form, camera_name: &str, notes: &[(&str, f64)]) -
             Form::Ros => format!("{key}:\n  rows: {rows}\n  cols: {columns}\n  data: [{data}]\n"),
         }
     };
-    let mut text = match form {
-        Form::OpenCv => "%YAML:1.0\n---\n".to_owned(),
-        Form::Ros => String::new(),
+    let header = match form {
+        Form::OpenCv => "%YAML:1.0\n---\n",
+        Form::Ros => "",
     };
-    text += &format!("image_width: {}\nimage_height: {}\n", lens.width, lens.height);
+    let mut parts = vec![format!("{header}image_width: {}\nimage_height: {}\n", lens.width, lens.height)];
     if form == Form::Ros {
-        text += &format!("camera_name: {camera_name}\n");
+        parts.push(format!("camera_name: {camera_name}\n"));
     }
-    text += &entry("camera_matrix", 3, &matrix);
-    text += &format!("distortion_model: {model}\n");
+    parts.push(entry("camera_matrix", 3, &matrix));
+    parts.push(format!("distortion_model: {model}\n"));
     // OpenCV wants a column, ROS a row.
-    text += &entry("distortion_coefficients", if form == Form::Ros { 1 } else { coefficients.len() }, &coefficients);
+    parts.push(entry("distortion_coefficients", if form == Form::Ros { 1 } else { coefficients.len() }, &coefficients));
     if form == Form::Ros {
-        text += &entry("rectification_matrix", 3, &identity);
-        text += &entry("projection_matrix", 3, &projection);
+        parts.push(entry("rectification_matrix", 3, &identity));
+        parts.push(entry("projection_matrix", 3, &projection));
     }
-    for (key, value) in notes {
-        text += &format!("{key}: {value:?}\n");
-    }
-    Some(text)
+    parts.extend(notes.iter().map(|(key, value)| format!("{key}: {value:?}\n")));
+    Some(parts.concat())
 }
 
 #[cfg(test)]

@@ -19,7 +19,7 @@ use output::{Facts, save};
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Exit codes: 0 the lens is calibrated, 1 the pictures give no lens (the reason has a figure), 2 an error. No \
-                  file is written unless all is done.\n\n\
+                  lens is written unless it is calibrated.\n\n\
                   1. daymark calibrate --print-pattern board.svg, printed and glued to something flat; or board.png on a \
                   screen.\n\
                   2. 10 to 20 pictures at the focus and zoom that will be used: tilted by 20 to 45 degrees about both axes, \
@@ -39,7 +39,7 @@ pub struct Args {
     /// Where the lens goes, as OpenCV writes it (YAML)
     #[arg(short, long, value_name = "CAMERA.yaml")]
     output: Option<PathBuf>,
-    /// Where the lens goes as a ROS camera_info (YAML)
+    /// Where the lens goes as ROS wants it (`camera_info` YAML)
     #[arg(long, value_name = "CAMERA.yaml")]
     ros: Option<PathBuf>,
     /// Name of the camera in the ROS file
