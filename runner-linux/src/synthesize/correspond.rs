@@ -107,14 +107,12 @@ fn matched([a, b]: [usize; 2], views: &[View], features: &[ViewFeatures], geomet
     let mut matches: Vec<[u32; 2]> = estimate.inliers.iter().map(|&number| alike[number]).collect();
     // With the geometry known, look-alikes that were not clear before may be now.
     let limit = threshold * threshold;
-    let near = |from: [f64; 2], to: [f64; 2]| {
-        if !(from[0].is_finite() && to[0].is_finite()) {
-            return false;
-        }
-        let pair = [left.normalized_from_ideal(from), right.normalized_from_ideal(to)];
-        estimate.pose.squared_distance(&pair) < limit
-    };
-    for pair in guided_matches(one, other, &matches, near) {
+    let lines = estimate.pose.lines(
+        one.ideal.iter().map(|&at| left.normalized_from_ideal(at)),
+        other.ideal.iter().map(|&at| right.normalized_from_ideal(at)),
+    );
+    // What has no direction is NaN, and not below.
+    for pair in guided_matches(one, other, &matches, |a, b| lines.squared_distance(a, b) < limit) {
         if estimate.pose.depths(&direction(pair)).is_some_and(|[a, b]| a > 0.0 && b > 0.0) {
             matches.push(pair);
         }

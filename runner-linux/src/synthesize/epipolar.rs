@@ -53,6 +53,24 @@ impl RelativePose {
         squared_distance(&self.essential(), pair)
     }
 
+    /// The epipolar lines of many directions of both views, for pairs among them.
+    pub fn lines(
+        &self,
+        first: impl Iterator<Item = [f64; 2]>,
+        second: impl Iterator<Item = [f64; 2]>,
+    ) -> EpipolarLines {
+        let essential = self.essential();
+        EpipolarLines {
+            of_first: first.map(|at| essential * homogeneous(at)).collect(),
+            of_second: second
+                .map(|at| {
+                    let line = essential.tr_mul(&homogeneous(at));
+                    (at, line.x * line.x, line.y * line.y)
+                })
+                .collect(),
+        }
+    }
+
     /// Depths of a pair's point along the optical axes of the two views, for `|t| = 1`; `None` for parallel rays.
     pub fn depths(&self, [a, b]: &Pair) -> Option<[f64; 2]> {
         let (x, y) = (self.rotation * homogeneous(*a), homogeneous(*b));
@@ -142,6 +160,26 @@ impl RelativePose {
             }
         }
         self
+    }
+}
+
+/// What is computed once for each direction of two views.
+#[derive(Debug, Clone)]
+pub struct EpipolarLines {
+    /// Lines in the second view.
+    of_first: Vec<Vector3<f64>>,
+    /// Directions of the second view, and the squares of their lines' coefficients in the first.
+    of_second: Vec<([f64; 2], f64, f64)>,
+}
+
+impl EpipolarLines {
+    /// The squared Sampson distance of a pair, by its numbers; NaN for a direction that is none.
+    #[inline]
+    pub fn squared_distance(&self, first: usize, second: usize) -> f64 {
+        let (p, ([x, y], qx, qy)) = (&self.of_first[first], &self.of_second[second]);
+        let n = x * p.x + y * p.y + p.z;
+        let length = p.x * p.x + p.y * p.y + qx + qy;
+        n * n / length
     }
 }
 

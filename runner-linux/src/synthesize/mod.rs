@@ -28,6 +28,7 @@ pub mod reconstruct;
 pub mod frame;
 pub mod report;
 pub mod triangulate;
+pub mod cells;
 pub mod mesh;
 pub mod render;
 pub mod texture;
