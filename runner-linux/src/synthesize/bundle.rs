@@ -95,11 +95,25 @@ struct Eye<'s> {
     k1: f64,
 }
 
+/// A residual and its derivatives.
 struct Linear {
     residual: Vector2<f64>,
-    camera: SMatrix<f64, 2, 6>,
-    lens: Matrix2<f64>,
+    /// By the point in the view frame, and that.
+    view: Matrix2x3<f64>,
+    offset: Vector3<f64>,
     point: Matrix2x3<f64>,
+    lens: Matrix2<f64>,
+}
+
+impl Linear {
+    /// By the camera: a turn w about the pinhole moves the view's point by w x offset; the pinhole moves it by -R.
+    fn camera(&self) -> SMatrix<f64, 2, 6> {
+        let turn = -(self.view * self.offset.cross_matrix());
+        let mut camera = SMatrix::<f64, 2, 6>::zeros();
+        camera.fixed_columns_mut::<3>(0).copy_from(&turn);
+        camera.fixed_columns_mut::<3>(3).copy_from(&(-self.point));
+        camera
+    }
 }
 
 impl Eye<'_> {
@@ -128,15 +142,14 @@ impl Eye<'_> {
             Matrix2::new(bend + 2.0 * k1 * x * x, 2.0 * k1 * x * y, 2.0 * k1 * x * y, bend + 2.0 * k1 * y * y)
                 * self.focal;
         let by_view = by_image * Matrix2x3::new(1.0, 0.0, -x, 0.0, 1.0, -y) / depth;
-        // A turn w about the pinhole moves the view's point by w x offset; the pinhole moves it by -R.
-        let turn = -(by_view * offset.cross_matrix());
-        let point = by_view * self.pose.view_from_model;
-        let mut camera = SMatrix::<f64, 2, 6>::zeros();
-        camera.fixed_columns_mut::<3>(0).copy_from(&turn);
-        camera.fixed_columns_mut::<3>(3).copy_from(&(-point));
         let bent = Vector2::new(x, y) * (self.focal * r2);
-        let residual = Vector2::from(at) - image;
-        Some(Linear { residual, camera, lens: Matrix2::from_columns(&[image, bent]), point })
+        Some(Linear {
+            residual: Vector2::from(at) - image,
+            view: by_view,
+            offset,
+            point: by_view * self.pose.view_from_model,
+            lens: Matrix2::from_columns(&[image, bent]),
+        })
     }
 }
 
@@ -318,9 +331,10 @@ impl Reduced {
             let length = linear.residual.norm();
             let weight = if length <= HUBER_PX { 1.0 } else { HUBER_PX / length };
             if !self.fixed(camera) {
-                let weighted = linear.camera.transpose() * weight;
+                let by_camera = linear.camera();
+                let weighted = by_camera.transpose() * weight;
                 let diagonal = self.pair(camera, camera);
-                self.pairs[diagonal] += weighted * linear.camera;
+                self.pairs[diagonal] += weighted * by_camera;
                 self.right[camera] += weighted * linear.residual;
                 if with_lens {
                     self.with_lens[camera] += weighted * linear.lens;
