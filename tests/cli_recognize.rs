@@ -45,6 +45,7 @@ fn make_folder() -> TempDir {
             error_dm: 25,
         }),
         views: View::enrollment(tower, Lens::VGA).map(view).into(),
+        model: None,
     };
     let landmarks = [0, 1, 3].map(|index| &towers[index]).into_iter().map(landmark).collect();
     let table = OwnedTable { profile: Profile::Handheld, landmarks };

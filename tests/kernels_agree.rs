@@ -298,6 +298,7 @@ fn the_whole_engine() {
             kind: Kind::Tower,
             position: None,
             views: vec![enrolled(&tower(number, "left"), profile)],
+            model: None,
         };
         let landmarks = [1, 2, 3].map(landmark).into();
         let bytes = OwnedTable { profile, landmarks }.to_bytes().expect("a table");

@@ -11,6 +11,7 @@ use std::time::{Duration, Instant};
 use daymark::frame::capture::{Capture, Patience};
 use daymark::frame::mock::{Mishap, Mock, Planned};
 use daymark::frame::{Delivery, Fault, Frame, FrameSource, Opener};
+use daymark::lens_source::LensChoice;
 use daymark::output::record::{Record, TableFacts};
 use daymark::output::target::{Sink, Target};
 use daymark::output::{Form, FormName};
@@ -95,7 +96,7 @@ impl Look for Reads {
         let best = (number > 0).then_some(answer);
         let verdict = best.map_or(Verdict::Unknown(NoAnswer::NothingFits), Verdict::Known);
         let recognition = Recognition { verdict, best, runner_up: None, views: 200, corners: 400 };
-        Ok(Seen { recognition, quality: Quality::Good, new_scene: false, times: LookTimes::default() })
+        Ok(Seen { recognition, quality: Quality::Good, new_scene: false, observer: None, times: LookTimes::default() })
     }
 
     fn landmark(&self, number: u32) -> Option<Landmark> {
@@ -179,7 +180,7 @@ fn soak<L: Look>(opener: Box<dyn Opener>, look: L, planned: &[Planned]) -> Told 
     let sink = Sink::start(Target::Path(PathBuf::from("/dev/null"), 0), true).expect("a sink");
     let run = Run {
         capture: Capture::start(Box::new(Mock::new(opener, planned)), Patience::REHEARSAL).expect("a thread"),
-        session: Session::new(look, 0.01, 100.0),
+        session: Session::new(look, 0.01, 100.0, 2.0),
         outputs: vec![Output { form: Box::new(Counting(Arc::clone(&told))), sink }],
         signals: Signals::default(),
         reloader: None,
@@ -262,7 +263,8 @@ fn twenty_thousand_frames_through_the_real_recognizer() {
     let mut enroll = std::process::Command::new(env!("CARGO_BIN_EXE_daymark"));
     enroll.args(["enroll", "--name", "Gate", "--no-lint", "--table"]).arg(&table).arg(&picture);
     assert!(enroll.status().expect("it runs").success());
-    let look = Recognizing::new(LiveTable::load(&table).expect("a table"), FalseAnswer::ONE_PERCENT);
+    let table = LiveTable::load(&table).expect("a table");
+    let look = Recognizing::new(table, FalseAnswer::ONE_PERCENT, LensChoice::by_picture(), 100.0);
     let frames = std::env::var("SOAK_FRAMES").ok().and_then(|frames| frames.parse().ok()).unwrap_or(20_000);
     let told = soak(Box::new(Again(read_gray(&picture).expect("a picture"), frames)), look, &faults(frames, 40));
     assert_eq!(told.frames, frames);

@@ -1,12 +1,12 @@
 //! The landmark table: what was enrolled, in one file that is read in place.
 //!
 //! ```text
-//! header 40 B | landmark index 12 B each | view index 16 B each | landmark records | view records
+//! header 40 B | landmark index 12 B each | view index 16 B each | model index 12 B each | records of each, in this order
 //! ```
 //!
 //! `core/FORMAT.md` specifies every byte. A **landmark** has a name, a [`Kind`] and, where known, a position; its
 //! **views** are the corners of one enrolled frame each, numbered through the whole table in the order of the
-//! landmarks.
+//! landmarks. Its **model**, if it has one, says where corners of its views are in space, and the surface between them.
 //!
 //! Two readers give the same results and the same errors: [`LandmarkTable`] reads in place from flash or a memory map,
 //! [`TableStream`] reads one record at a time from an [`embedded_io`] source into the caller's buffer. The recognizer
@@ -17,8 +17,8 @@
 //! | step | checks |
 //! |---|---|
 //! | `open` | the header, the whole index, every landmark's record, the order of the names; nothing of the views |
-//! | `view` | the view's checksum, its form, every corner |
-//! | `verify`, `verified` | all views; [`LandmarkTable::verified`] gives a table whose later reads skip what cannot change |
+//! | `view`, `model` | the record's checksum, its form, every corner, point and triangle |
+//! | `verify`, `verified` | all views and models; [`LandmarkTable::verified`] gives a table whose later reads skip what cannot change |
 //!
 //! A table in place, from its bytes to its first corner:
 //!
@@ -42,25 +42,31 @@ mod in_place;
 mod index;
 mod kind;
 mod landmark;
+mod model;
 mod stream;
 mod view;
 
-pub use encode::{EncodeError, TableEncoder, encode_landmark, encode_view};
+pub use encode::{EncodeError, TableEncoder, encode_landmark, encode_model, encode_view};
 pub use error::{RecordKind, StreamError, TableError, TableLimit};
 pub use fault::{CornerFault, HeaderFault, IndexFault, RecordFault};
-pub use header::{FORMAT_VERSION, HEADER_BYTES, Header, MAGIC};
+pub use header::{FORMAT_VERSION, HEADER_BYTES, Header, MAGIC, VERSION_WITHOUT_MODELS};
 pub use in_place::LandmarkTable;
-pub use index::{LANDMARK_ENTRY_BYTES, VIEW_ENTRY_BYTES};
+pub use index::{LANDMARK_ENTRY_BYTES, MODEL_ENTRY_BYTES, VIEW_ENTRY_BYTES};
 pub use kind::Kind;
 pub use landmark::{
     ERROR_LIMIT_DM, GeoPosition, LANDMARK_BYTES, LATITUDE_LIMIT_E7, LONGITUDE_LIMIT_E7, Landmark, NAME_BYTES,
+};
+pub use model::{
+    ModelFacts, ModelFault, ModelPoint, ModelledView, POINT_BYTES, POINTS_LIMIT, PackedPoint, StoredAzimuth,
+    StoredModel, TRIANGLE_BYTES, TRIANGLES_LIMIT, UNIT_LIMIT_UM,
 };
 pub use stream::TableStream;
 pub use view::{CORNER_BYTES, LEVELS, SIDE_LIMIT, StoredView, VIEW_HEADER_BYTES, corner_key, on_grid};
 
 use crate::profile::Profile;
 
-/// Views in one table, at most. With it every offset of a table fits 32 bits, whatever the views hold.
+/// Views in one table, at most. With it every offset of a table without models fits 32 bits, whatever the views hold; one
+/// with models may come to that end earlier, and says so when it is written.
 pub const VIEWS_LIMIT: u32 = 250_000;
 
 // Every landmark has a view, so there are at most as many landmarks; view_bytes() counts a view's index entry.
@@ -114,6 +120,16 @@ pub trait ViewSource {
     ///
     /// The record is damaged or cannot be read, `buffer` is too small, or there is no such landmark.
     fn landmark<'s>(&'s mut self, number: u32, buffer: &'s mut [u8]) -> Result<Landmark<'s>, Self::Error>;
+
+    /// Bytes that the buffer of [`model`](Self::model) must have, for any model of this table; 0 for a reader in place.
+    fn model_bytes(&self) -> usize;
+
+    /// The model of landmark `number`, in `0..landmark_count()`, if it has one. A reader in place ignores `buffer`.
+    ///
+    /// # Errors
+    ///
+    /// The record is damaged or cannot be read, `buffer` is too small, or there is no such landmark.
+    fn model<'s>(&'s mut self, number: u32, buffer: &'s mut [u8]) -> Result<Option<StoredModel<'s>>, Self::Error>;
 
     /// The class of device whose views the table holds.
     fn profile(&self) -> Profile {

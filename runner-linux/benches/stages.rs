@@ -109,7 +109,8 @@ fn features<const COUNT: u16>(bencher: Bencher<'_, '_>, name: &str) {
 fn table(tower: &Tower) -> Vec<u8> {
     let [left, _] = View::enrollment(tower, Lens::VGA);
     let view = enroll::view(&drawn(&left), Profile::Handheld).expect("a view");
-    let landmark = LandmarkEntry { name: tower.name.clone(), kind: Kind::Tower, position: None, views: vec![view] };
+    let landmark =
+        LandmarkEntry { name: tower.name.clone(), kind: Kind::Tower, position: None, views: vec![view], model: None };
     OwnedTable { profile: Profile::Handheld, landmarks: vec![landmark] }.to_bytes().expect("a table")
 }
 

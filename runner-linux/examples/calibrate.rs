@@ -62,7 +62,7 @@ fn main() -> Result<(), Box<dyn Error + Send + Sync>> {
         .map(|building| {
             let own = frames.iter().filter(|(name, _)| name.as_deref() == Some(&building.name));
             let views = own.map(|(_, picture)| enroll::view(picture, profile)).collect::<Result<_, _>>()?;
-            Ok(LandmarkEntry { name: building.name.clone(), kind: Kind::Building, position: None, views })
+            Ok(LandmarkEntry { name: building.name.clone(), kind: Kind::Building, position: None, views, model: None })
         })
         .collect::<Result<_, enroll::TooFewCorners>>()?;
     let bytes = OwnedTable { profile, landmarks: enrolled }.to_bytes()?;

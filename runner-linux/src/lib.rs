@@ -4,6 +4,7 @@
 //! ```text
 //!  picture ─── enroll ─────── table_file        pictures become views of a table
 //!  picture ─── engine ─────── report            frames become answers, and answers text, JSON and drawings
+//!  engine ──── observer ───── report            an answer and a lens become a position
 //!  picture ─── correspond                       which corner of one picture is which of another
 //!  dataset ─── command::evaluate                how often that is right
 //!  frame ───── watch ──────── output            a camera becomes answers that stand until they are withdrawn
@@ -16,11 +17,13 @@ mod cut_jpeg;
 pub mod simd;
 pub mod engine;
 pub mod camera_file;
+pub mod lens_source;
 pub mod synthesize;
 pub mod classify;
 pub mod model_file;
 pub mod enroll;
 pub mod table_file;
+pub mod observer;
 pub mod dataset;
 mod calendar;
 mod log;

@@ -4,8 +4,10 @@
 //! as a whole: the new bytes go to a temporary file in the same folder, to the disk, and then by renaming to the
 //! table's name. A crash at any instant leaves the old table or the new one.
 
+mod model_entry;
 mod replace;
 
+pub use model_entry::ModelEntry;
 pub use replace::replace_file;
 
 use daymark_core::feature::Feature;
@@ -39,6 +41,8 @@ pub struct LandmarkEntry {
     pub position: Option<GeoPosition>,
     /// Its views, at least one, in the order in which they were enrolled; the table keeps that order.
     pub views: Vec<ViewEntry>,
+    /// Where corners of its views are in space, if that is known.
+    pub model: Option<ModelEntry>,
 }
 
 /// One enrolled frame.
@@ -64,6 +68,8 @@ pub enum BuildError {
     NoViews(String),
     /// A view of a landmark cannot be stored; the number counts from 0.
     View(String, usize, EncodeError),
+    /// A landmark's model cannot be stored.
+    Model(String, EncodeError),
     /// The table as a whole cannot be stored.
     Table(EncodeError),
 }
@@ -112,6 +118,7 @@ impl OwnedTable {
                 kind: landmark.kind,
                 position: landmark.position,
                 views: landmark.views.map(view).collect::<Result<_, TableError>>()?,
+                model: table.model(number)?.map(|model| ModelEntry::of(&model)),
             })
         };
         let landmarks = (0..table.landmark_count()).map(landmark).collect::<Result<_, TableError>>()?;
@@ -149,8 +156,9 @@ impl OwnedTable {
         let corners_limit = u16::try_from(most_corners.max(self.profile.corners_per_view())).unwrap_or(u16::MAX);
         let landmark_count = u32::try_from(landmarks.len()).unwrap_or(u32::MAX);
         let view_count = u32::try_from(views().count()).unwrap_or(u32::MAX);
-        let mut encoder =
-            TableEncoder::new(self.profile, corners_limit, landmark_count, view_count).map_err(BuildError::Table)?;
+        let has_models = landmarks.iter().any(|landmark| landmark.model.is_some());
+        let new = if has_models { TableEncoder::with_models } else { TableEncoder::new };
+        let mut encoder = new(self.profile, corners_limit, landmark_count, view_count).map_err(BuildError::Table)?;
 
         let mut table = vec![0; HEADER_BYTES];
         let mut records = Vec::new();
@@ -174,6 +182,17 @@ impl OwnedTable {
                     .map_err(|error| BuildError::View(landmark.name.clone(), place, error))?;
                 table.extend(entry);
             }
+        }
+        for landmark in landmarks.iter().filter(|_| has_models) {
+            let views = u32::try_from(landmark.views.len()).unwrap_or(u32::MAX);
+            let record = landmark.model.as_ref().map(|model| model.encode(corners_limit, &landmark.views)).transpose();
+            let entry = record
+                .and_then(|record| {
+                    records.extend(record.iter().flatten());
+                    encoder.push_model(views, record.as_deref())
+                })
+                .map_err(|error| BuildError::Model(landmark.name.clone(), error))?;
+            table.extend(entry);
         }
         let header = encoder.finish().map_err(BuildError::Table)?;
         table.splice(..HEADER_BYTES, header);
@@ -238,6 +257,7 @@ impl fmt::Display for BuildError {
             Self::DuplicateName(name) => write!(out, "two landmarks are called {name:?}: give one another name"),
             Self::NoViews(name) => write!(out, "landmark {name:?} has no view: enroll one, or leave it out"),
             Self::View(name, view, error) => write!(out, "landmark {name:?}, view {view}: {error}"),
+            Self::Model(name, error) => write!(out, "landmark {name:?}, model: {error}"),
             Self::Table(error) => error.fmt(out),
         }
     }
@@ -312,7 +332,7 @@ mod tests {
 
     fn landmark(name: &str, views: &[u64]) -> LandmarkEntry {
         let views = views.iter().copied().map(view).collect();
-        LandmarkEntry { name: name.to_owned(), kind: Kind::Tower, position: None, views }
+        LandmarkEntry { name: name.to_owned(), kind: Kind::Tower, position: None, views, model: None }
     }
 
     fn two_landmarks() -> OwnedTable {

@@ -14,6 +14,7 @@ mod solve;
 pub(crate) mod space;
 pub mod direction;
 pub mod facade;
+pub mod locate;
 pub mod pose;
 pub mod weak_perspective;
 pub mod triangulate;

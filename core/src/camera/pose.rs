@@ -118,6 +118,21 @@ impl Pose {
         length(minus(self.camera_from_model.centre(), self.centroid))
     }
 
+    /// The same pose if lengths, or the focal length, are known to this share only (one standard deviation): the range is
+    /// uncertain by as much, so that `share^2 d d^T` is added to the centre's covariance, with `d` from the middle of the
+    /// points to the centre.
+    #[must_use]
+    pub fn with_range_error(&self, share: f64) -> Self {
+        let away = minus(self.camera_from_model.centre(), self.centroid);
+        let mut covariance = self.covariance;
+        for (row, x) in covariance.iter_mut().zip(away) {
+            for (entry, y) in row.iter_mut().zip(away) {
+                *entry += share * share * x * y;
+            }
+        }
+        Self { covariance, ..*self }
+    }
+
     /// Standard deviation of the centre in the direction that is known worst, metres.
     pub fn deviation(&self) -> f64 {
         let [a, b, c, ..] = self.covariance;

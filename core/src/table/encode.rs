@@ -1,16 +1,18 @@
 //! How a table is written: one definition for enrollment, the tests and the golden files.
 
 use super::checksum::{TableId, crc32};
+use super::header::{FORMAT_VERSION, VERSION_WITHOUT_MODELS};
 use super::index::{Entry, IndexCheck, ViewEntry};
 use super::landmark::{LandmarkRecord, LastName};
 use super::{
-    HEADER_BYTES, Header, HeaderFault, IndexFault, LANDMARK_ENTRY_BYTES, RecordFault, RecordKind, StoredView,
-    TableError, TableLimit, VIEW_ENTRY_BYTES,
+    HEADER_BYTES, Header, HeaderFault, IndexFault, LANDMARK_ENTRY_BYTES, MODEL_ENTRY_BYTES, RecordFault, RecordKind,
+    StoredModel, StoredView, TableError, TableLimit, VIEW_ENTRY_BYTES,
 };
 use crate::profile::Profile;
 use core::fmt;
 
 pub use super::landmark::encode_landmark;
+pub use super::model::encode_model;
 pub use super::view::encode_view;
 
 /// Why something cannot be written; the caller knows which record it was.
@@ -51,7 +53,7 @@ pub enum EncodeError {
 }
 
 /// Makes the header and the index of a table whose records go by one after the other: first every landmark, sorted by
-/// name, then every view, in the order of their landmarks.
+/// name, then every view, in the order of their landmarks, then, if there are models, that of every landmark or none.
 ///
 /// It holds no records and no index. What each call returns goes to the table in the same order: the entries after
 /// the first [`HEADER_BYTES`], the records after all entries, the header to the front at the end. It accepts nothing
@@ -74,6 +76,7 @@ pub struct TableEncoder {
     last_name: LastName,
     landmarks: u32,
     views: u32,
+    models: u32,
 }
 
 impl TableEncoder {
@@ -88,7 +91,31 @@ impl TableEncoder {
         landmark_count: u32,
         view_count: u32,
     ) -> Result<Self, EncodeError> {
-        let header = Header::new(profile, corners_limit, landmark_count, view_count)?;
+        Self::of_version(VERSION_WITHOUT_MODELS, profile, corners_limit, landmark_count, view_count)
+    }
+
+    /// The same for a table in which some landmark has a model.
+    ///
+    /// # Errors
+    ///
+    /// As [`TableEncoder::new`].
+    pub fn with_models(
+        profile: Profile,
+        corners_limit: u16,
+        landmark_count: u32,
+        view_count: u32,
+    ) -> Result<Self, EncodeError> {
+        Self::of_version(FORMAT_VERSION, profile, corners_limit, landmark_count, view_count)
+    }
+
+    fn of_version(
+        version: u16,
+        profile: Profile,
+        corners_limit: u16,
+        landmark_count: u32,
+        view_count: u32,
+    ) -> Result<Self, EncodeError> {
+        let header = Header::new(version, profile, corners_limit, landmark_count, view_count)?;
         Ok(Self {
             header,
             check: IndexCheck::new(&header, u32::MAX),
@@ -96,6 +123,7 @@ impl TableEncoder {
             last_name: LastName::new(),
             landmarks: 0,
             views: 0,
+            models: 0,
         })
     }
 
@@ -137,9 +165,40 @@ impl TableEncoder {
             return Err(EncodeError::Count { kind: RecordKind::View, found, announced });
         }
         StoredView::decode(record, landmark, self.header.corners_limit(), false)?;
-        let entry = ViewEntry { landmark, record: self.entry(record, view_checksum(landmark, record))? };
+        let entry = ViewEntry { landmark, record: self.entry(record, record_checksum(landmark, record))? };
         self.check.view(entry)?;
         self.views = found;
+        let bytes = entry.to_bytes();
+        self.id.update(&bytes);
+        Ok(bytes)
+    }
+
+    /// Takes the next landmark's model, as [`encode_model`] gives it, or none, and returns its entry in the index.
+    /// `landmark_views` is how many views the landmark has.
+    ///
+    /// # Errors
+    ///
+    /// All that a reader would refuse; [`EncodeError::Count`] if it is one too many, or views are still to come.
+    pub fn push_model(
+        &mut self,
+        landmark_views: u32,
+        record: Option<&[u8]>,
+    ) -> Result<[u8; MODEL_ENTRY_BYTES], EncodeError> {
+        self.complete(RecordKind::View)?;
+        let (number, announced) = (self.models, self.announced(RecordKind::Model));
+        let found = number.saturating_add(1);
+        if found > announced {
+            return Err(EncodeError::Count { kind: RecordKind::Model, found, announced });
+        }
+        let entry = match record {
+            Some(record) => {
+                StoredModel::decode(record, landmark_views, self.header.corners_limit(), false)?;
+                self.entry(record, record_checksum(number, record))?
+            }
+            None => Entry { offset: self.check.end(), length: 0, checksum: 0 },
+        };
+        self.check.model(entry)?;
+        self.models = found;
         let bytes = entry.to_bytes();
         self.id.update(&bytes);
         Ok(bytes)
@@ -149,10 +208,12 @@ impl TableEncoder {
     ///
     /// # Errors
     ///
-    /// [`EncodeError::Count`] if records are missing, [`EncodeError::Index`] if the last landmarks have no view.
+    /// [`EncodeError::Count`] if records are missing, [`EncodeError::Index`] if the last landmarks have no view, or models were
+    /// announced and no landmark has one.
     pub fn finish(self) -> Result<[u8; HEADER_BYTES], EncodeError> {
         self.complete(RecordKind::Landmark)?;
         self.complete(RecordKind::View)?;
+        self.complete(RecordKind::Model)?;
         let end = self.check.end();
         self.check.finish(end)?;
         let header = self.header.completed(end, 0)?;
@@ -160,11 +221,22 @@ impl TableEncoder {
     }
 
     fn complete(&self, kind: RecordKind) -> Result<(), EncodeError> {
-        let (found, announced) = match kind {
-            RecordKind::Landmark => (self.landmarks, self.header.landmark_count()),
-            RecordKind::View => (self.views, self.header.view_count()),
+        let announced = self.announced(kind);
+        let found = match kind {
+            RecordKind::Landmark => self.landmarks,
+            RecordKind::View => self.views,
+            RecordKind::Model => self.models,
         };
         if found == announced { Ok(()) } else { Err(EncodeError::Count { kind, found, announced }) }
+    }
+
+    fn announced(&self, kind: RecordKind) -> u32 {
+        match kind {
+            RecordKind::Landmark => self.header.landmark_count(),
+            RecordKind::View => self.header.view_count(),
+            RecordKind::Model if self.header.has_models() => self.header.landmark_count(),
+            RecordKind::Model => 0,
+        }
     }
 
     fn entry(&self, record: &[u8], checksum: u32) -> Result<Entry, EncodeError> {
@@ -177,9 +249,9 @@ impl TableEncoder {
     }
 }
 
-/// The CRC-32 of a view's record: over the number of its landmark, then its bytes, so that no damage to an index that
-/// was sound when the table was opened gives a view to another landmark.
-pub(super) fn view_checksum(landmark: u32, record: &[u8]) -> u32 {
+/// The CRC-32 of a view's or a model's record: over the number of its landmark, then its bytes, so that no damage to an
+/// index that was sound when the table was opened gives it to another landmark.
+pub(super) fn record_checksum(landmark: u32, record: &[u8]) -> u32 {
     crc32(&[&landmark.to_le_bytes(), record])
 }
 

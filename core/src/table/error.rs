@@ -3,13 +3,15 @@
 use super::{HeaderFault, IndexFault, RecordFault};
 use core::fmt;
 
-/// The two kinds of record in a table.
+/// The kinds of record in a table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum RecordKind {
     /// A landmark: name, kind, position.
     Landmark,
     /// A view: the corners of one enrolled frame.
     View,
+    /// A model: where corners of a landmark's views are in space.
+    Model,
 }
 
 /// What there was too much of.
@@ -148,6 +150,7 @@ impl fmt::Display for RecordKind {
         out.write_str(match self {
             Self::Landmark => "landmark",
             Self::View => "view",
+            Self::Model => "model",
         })
     }
 }

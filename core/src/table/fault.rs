@@ -1,5 +1,6 @@
 //! What is wrong inside a header, an index entry or a record: the reason within a [`TableError`](super::TableError).
 
+use super::model::ModelFault;
 use super::{CORNER_BYTES, ERROR_LIMIT_DM, LATITUDE_LIMIT_E7, LEVELS, LONGITUDE_LIMIT_E7, NAME_BYTES, SIDE_LIMIT};
 use crate::feature::COMMONNESS;
 use core::fmt;
@@ -86,6 +87,11 @@ pub enum IndexFault {
         /// The landmark after that one, if there is one; 0 for the first view.
         most: u32,
     },
+    /// A landmark without a model whose entry is not an empty one: the offset at which the next record would begin, no length,
+    /// no checksum.
+    EmptyEntry,
+    /// The version says that there are models, and no landmark has one.
+    NoModels,
     /// The last view does not belong to the last landmark, so that some landmarks have no view.
     LandmarkWithoutView {
         /// The last landmark that has views, plus one.
@@ -162,6 +168,8 @@ pub enum RecordFault {
         /// What is wrong with it.
         fault: CornerFault,
     },
+    /// The model cannot be.
+    Model(ModelFault),
 }
 
 /// A corner of a view that cannot be.
@@ -230,6 +238,8 @@ impl fmt::Display for IndexFault {
             Self::Landmark { found, least, most } => {
                 write!(out, "it belongs to landmark {found}, the turn is at {least} to {most}")
             }
+            Self::EmptyEntry => write!(out, "it is for no model and not written like that"),
+            Self::NoModels => write!(out, "no landmark has a model, but the version says so"),
             Self::LandmarkWithoutView { with_views, landmarks } => {
                 write!(out, "it is the last, and only {with_views} of {landmarks} landmarks have views")
             }
@@ -266,6 +276,7 @@ impl fmt::Display for RecordFault {
                 write!(out, "it has {found} corners ({CORNER_BYTES} bytes each), its table allows 1 to {allowed}")
             }
             Self::Corner { index, fault } => write!(out, "corner {index}: {fault}"),
+            Self::Model(fault) => fault.fmt(out),
         }
     }
 }

@@ -1,7 +1,9 @@
 //! The first 40 bytes: what a table is, how large, and whose.
 
 use super::checksum::{TableId, crc32, joined};
-use super::{HeaderFault, LANDMARK_ENTRY_BYTES, TableError, TableLimit, VIEW_ENTRY_BYTES, VIEWS_LIMIT};
+use super::{
+    HeaderFault, LANDMARK_ENTRY_BYTES, MODEL_ENTRY_BYTES, TableError, TableLimit, VIEW_ENTRY_BYTES, VIEWS_LIMIT,
+};
 use crate::feature::SIGNATURE_BITS;
 use crate::profile::Profile;
 use core::cmp::Ordering;
@@ -9,8 +11,11 @@ use core::cmp::Ordering;
 /// The first eight bytes of every table, of every version: `DAYMARK` and the control character that ends a text file.
 pub const MAGIC: [u8; 8] = *b"DAYMARK\x1A";
 
-/// The format version that this program writes, and the newest that it reads.
-pub const FORMAT_VERSION: u16 = 1;
+/// The newest format version that this program reads and writes: a table with models.
+pub const FORMAT_VERSION: u16 = 2;
+
+/// The version of a table without models.
+pub const VERSION_WITHOUT_MODELS: u16 = 1;
 
 /// Bytes of the header, of every version.
 pub const HEADER_BYTES: usize = 40;
@@ -18,6 +23,7 @@ pub const HEADER_BYTES: usize = 40;
 /// The counts, limits and identity of a table, checked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Header {
+    version: u16,
     profile: Profile,
     corners_limit: u16,
     landmark_count: u32,
@@ -27,6 +33,16 @@ pub struct Header {
 }
 
 impl Header {
+    /// The format version: 2 if a landmark of the table has a model, else 1.
+    pub const fn version(&self) -> u16 {
+        self.version
+    }
+
+    /// Whether a landmark of the table has a model.
+    pub const fn has_models(&self) -> bool {
+        self.version > VERSION_WITHOUT_MODELS
+    }
+
     /// The class of device whose views the table holds.
     pub const fn profile(&self) -> Profile {
         self.profile
@@ -100,7 +116,7 @@ impl Header {
         } else if u32::from(bits) != SIGNATURE_BITS {
             HeaderFault::SignatureBits { found: bits, expected: SIGNATURE_BITS as u16 }
         } else if let Some(profile) = Profile::from_code(profile) {
-            let header = Self::new(profile, corners, landmarks, views)?;
+            let header = Self::new(version, profile, corners, landmarks, views)?;
             return header.completed(length, id);
         } else {
             HeaderFault::Profile { code: profile }
@@ -110,6 +126,7 @@ impl Header {
 
     /// A header without length and id, its limit and counts checked.
     pub(super) fn new(
+        version: u16,
         profile: Profile,
         corners_limit: u16,
         landmark_count: u32,
@@ -127,7 +144,7 @@ impl Header {
             let fault = HeaderFault::LandmarkCount { landmarks: landmark_count, views: view_count };
             return Err(TableError::Header(fault));
         }
-        Ok(Self { profile, corners_limit, landmark_count, view_count, file_length: 0, table_id: 0 })
+        Ok(Self { version, profile, corners_limit, landmark_count, view_count, file_length: 0, table_id: 0 })
     }
 
     /// The header with its length and id, the length checked.
@@ -150,7 +167,7 @@ impl Header {
     fn identified_bytes(self) -> [u8; ID_AT] {
         joined(&[
             &MAGIC,
-            &FORMAT_VERSION.to_le_bytes(),
+            &self.version.to_le_bytes(),
             &[self.profile.code(), 0],
             &(SIGNATURE_BITS as u16).to_le_bytes(),
             &self.corners_limit.to_le_bytes(),
@@ -187,9 +204,15 @@ impl Header {
         (HEADER_BYTES as u32).saturating_add(self.landmark_count.saturating_mul(LANDMARK_ENTRY_BYTES as u32))
     }
 
+    /// Where the index of the views ends and that of the models begins, if there are any.
+    pub(super) const fn model_index_begin(&self) -> u32 {
+        self.view_index_begin().saturating_add(self.view_count.saturating_mul(VIEW_ENTRY_BYTES as u32))
+    }
+
     /// Where the index ends and the records begin. [`VIEWS_LIMIT`] keeps it far below 2^32.
     pub(super) const fn records_begin(&self) -> u32 {
-        self.view_index_begin().saturating_add(self.view_count.saturating_mul(VIEW_ENTRY_BYTES as u32))
+        let models = if self.has_models() { self.landmark_count } else { 0 };
+        self.model_index_begin().saturating_add(models.saturating_mul(MODEL_ENTRY_BYTES as u32))
     }
 }
 

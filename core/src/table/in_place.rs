@@ -1,12 +1,12 @@
 //! The reader in place: a table in flash, in a memory map, or in a file that was read.
 
 use super::checksum::{TableId, crc32};
-use super::encode::view_checksum;
+use super::encode::record_checksum;
 use super::index::{Entry, IndexCheck, ViewEntry};
 use super::landmark::{LandmarkRecord, LastName};
 use super::{
-    HEADER_BYTES, Header, LANDMARK_ENTRY_BYTES, Landmark, RecordKind, StoredView, TableError, VIEW_ENTRY_BYTES,
-    ViewSource,
+    HEADER_BYTES, Header, LANDMARK_ENTRY_BYTES, Landmark, MODEL_ENTRY_BYTES, RecordKind, StoredModel, StoredView,
+    TableError, VIEW_ENTRY_BYTES, ViewSource,
 };
 use crate::profile::Profile;
 use core::ops::Range;
@@ -19,6 +19,8 @@ pub struct LandmarkTable<'a> {
     header: Header,
     landmark_index: &'a [[u8; LANDMARK_ENTRY_BYTES]],
     view_index: &'a [[u8; VIEW_ENTRY_BYTES]],
+    /// Empty for a table without models.
+    model_index: &'a [[u8; MODEL_ENTRY_BYTES]],
     /// Every record was read and accepted; the borrow keeps the bytes as they were.
     verified: bool,
 }
@@ -37,21 +39,25 @@ impl<'a> LandmarkTable<'a> {
         let cut = TableError::Truncated { needed: u64::from(header.file_length()), available: bytes.len() as u64 };
         let part = |range: Range<u32>| bytes.get(range.start as usize..range.end as usize).ok_or(cut);
         let landmark_index = part(HEADER_BYTES as u32..header.view_index_begin())?;
-        let view_index = part(header.view_index_begin()..header.records_begin())?;
+        let view_index = part(header.view_index_begin()..header.model_index_begin())?;
+        let model_index = part(header.model_index_begin()..header.records_begin())?;
 
         let mut id = TableId::new();
         id.update(landmark_index);
         id.update(view_index);
+        id.update(model_index);
         header.check_id(id)?;
 
         let (landmark_index, _) = landmark_index.as_chunks();
         let (view_index, _) = view_index.as_chunks();
+        let (model_index, _) = model_index.as_chunks();
         let mut check = IndexCheck::new(&header, header.file_length());
         landmark_index.iter().try_for_each(|entry| check.landmark(Entry::from_bytes(entry)))?;
         view_index.iter().try_for_each(|entry| check.view(ViewEntry::from_bytes(entry)))?;
+        model_index.iter().try_for_each(|entry| check.model(Entry::from_bytes(entry)))?;
         check.finish(header.file_length())?;
 
-        let table = Self { bytes, header, landmark_index, view_index, verified: false };
+        let table = Self { bytes, header, landmark_index, view_index, model_index, verified: false };
         let mut last_name = LastName::new();
         for (number, entry) in (0..).zip(landmark_index) {
             let record = table.landmark_record(number, Entry::from_bytes(entry))?;
@@ -76,13 +82,14 @@ impl<'a> LandmarkTable<'a> {
         Ok(self)
     }
 
-    /// Reads every view, and accepts the table or says what is wrong with the first record that is.
+    /// Reads every view and every model, and accepts the table or says what is wrong with the first record that is.
     ///
     /// # Errors
     ///
     /// [`TableError::RecordChecksum`] or [`TableError::Record`].
     pub fn verify(&self) -> Result<(), TableError> {
-        (0..self.view_count()).try_for_each(|number| self.view(number).map(|_| ()))
+        (0..self.view_count()).try_for_each(|number| self.view(number).map(|_| ()))?;
+        (0..self.landmark_count()).try_for_each(|number| self.model(number).map(|_| ()))
     }
 
     /// The counts, limits and identity of the table.
@@ -145,6 +152,21 @@ impl<'a> LandmarkTable<'a> {
         checked_view(&self.header, number, entry, record)
     }
 
+    /// The model of landmark `number`, if it has one.
+    ///
+    /// # Errors
+    ///
+    /// [`TableError::RecordChecksum`], [`TableError::Record`] or [`TableError::NoSuchRecord`].
+    pub fn model(&self, number: u32) -> Result<Option<StoredModel<'a>>, TableError> {
+        let views = self.landmark(number)?.views;
+        let Some(entry) = self.model_index.get(number as usize).map(Entry::from_bytes) else { return Ok(None) };
+        if entry.length == 0 {
+            return Ok(None);
+        }
+        let record = entry.record(self.bytes)?;
+        checked_model(&self.header, number, views, entry, record, self.verified).map(Some)
+    }
+
     fn landmark_record(&self, number: u32, entry: Entry) -> Result<LandmarkRecord<'a>, TableError> {
         checked_landmark(number, entry, entry.record(self.bytes)?)
     }
@@ -168,6 +190,14 @@ impl ViewSource for LandmarkTable<'_> {
     fn landmark<'s>(&'s mut self, number: u32, _: &'s mut [u8]) -> Result<Landmark<'s>, TableError> {
         LandmarkTable::landmark(self, number)
     }
+
+    fn model_bytes(&self) -> usize {
+        0
+    }
+
+    fn model<'s>(&'s mut self, number: u32, _: &'s mut [u8]) -> Result<Option<StoredModel<'s>>, TableError> {
+        LandmarkTable::model(self, number)
+    }
 }
 
 /// A view's record: checksum, form and meaning.
@@ -178,7 +208,7 @@ pub(super) fn checked_view<'a>(
     record: &'a [u8],
 ) -> Result<StoredView<'a>, TableError> {
     let kind = RecordKind::View;
-    let (stored, computed) = (entry.record.checksum, view_checksum(entry.landmark, record));
+    let (stored, computed) = (entry.record.checksum, record_checksum(entry.landmark, record));
     if stored != computed {
         return Err(TableError::RecordChecksum { kind, number, stored, computed });
     }
@@ -187,6 +217,26 @@ pub(super) fn checked_view<'a>(
         number,
         fault,
     })
+}
+
+/// A model's record: checksum, form and meaning, unless all that was checked before.
+pub(super) fn checked_model<'a>(
+    header: &Header,
+    number: u32,
+    views: Range<u32>,
+    entry: Entry,
+    record: &'a [u8],
+    trusted: bool,
+) -> Result<StoredModel<'a>, TableError> {
+    let kind = RecordKind::Model;
+    if !trusted {
+        let (stored, computed) = (entry.checksum, record_checksum(number, record));
+        if stored != computed {
+            return Err(TableError::RecordChecksum { kind, number, stored, computed });
+        }
+    }
+    StoredModel::decode(record, views.len() as u32, header.corners_limit(), trusted)
+        .map_err(|fault| TableError::Record { kind, number, fault })
 }
 
 /// A landmark's record: checksum, form and meaning.

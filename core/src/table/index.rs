@@ -2,6 +2,7 @@
 
 use super::checksum::joined;
 use super::landmark::{LANDMARK_BYTES, LANDMARK_BYTES_LEAST};
+use super::model::{MODEL_BYTES_LEAST, MODEL_BYTES_MOST};
 use super::view::{CORNER_BYTES, VIEW_BYTES_LEAST, VIEW_HEADER_BYTES};
 use super::{Header, IndexFault, RecordKind, TableError};
 
@@ -10,6 +11,9 @@ pub const LANDMARK_ENTRY_BYTES: usize = 12;
 
 /// Bytes of a view's entry in the index.
 pub const VIEW_ENTRY_BYTES: usize = 16;
+
+/// Bytes of a model's entry in the index; there is one for each landmark.
+pub const MODEL_ENTRY_BYTES: usize = 12;
 
 /// Where a record is, and its CRC-32.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -72,9 +76,22 @@ pub(super) struct IndexCheck {
     views: u32,
     /// Landmarks `0..with_views` have views so far.
     with_views: u32,
+    /// Entries of models seen, and how many of them are not empty.
+    model_entries: u32,
+    models: u32,
+    has_models: bool,
     /// Where the last record ends.
     end: u32,
-    largest: u32,
+    longest: Longest,
+}
+
+/// Bytes of the longest records.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) struct Longest {
+    /// Of landmarks and views, which a walk over the table reads.
+    pub(super) walked: u32,
+    /// Of models.
+    pub(super) model: u32,
 }
 
 impl IndexCheck {
@@ -87,8 +104,11 @@ impl IndexCheck {
             landmarks: 0,
             views: 0,
             with_views: 0,
+            model_entries: 0,
+            models: 0,
+            has_models: header.has_models(),
             end: header.records_begin(),
-            largest: 0,
+            longest: Longest::default(),
         }
     }
 
@@ -96,11 +116,8 @@ impl IndexCheck {
     pub(super) fn landmark(&mut self, entry: Entry) -> Result<(), TableError> {
         let number = self.landmarks;
         self.landmarks = number.saturating_add(1);
-        self.record(entry, LANDMARK_BYTES_LEAST as u32, LANDMARK_BYTES as u32).map_err(|fault| TableError::Index {
-            kind: RecordKind::Landmark,
-            number,
-            fault,
-        })
+        let length = self.record(entry, LANDMARK_BYTES_LEAST as u32, LANDMARK_BYTES as u32);
+        self.walked(length).map_err(|fault| TableError::Index { kind: RecordKind::Landmark, number, fault })
     }
 
     /// The next view's entry.
@@ -108,8 +125,26 @@ impl IndexCheck {
         let number = self.views;
         self.views = number.saturating_add(1);
         self.turn(entry.landmark)
-            .and_then(|()| self.record(entry.record, VIEW_BYTES_LEAST as u32, self.view_longest))
+            .and_then(|()| {
+                let length = self.record(entry.record, VIEW_BYTES_LEAST as u32, self.view_longest);
+                self.walked(length)
+            })
             .map_err(|fault| TableError::Index { kind: RecordKind::View, number, fault })
+    }
+
+    /// The entry of the next landmark's model.
+    pub(super) fn model(&mut self, entry: Entry) -> Result<(), TableError> {
+        let number = self.model_entries;
+        self.model_entries = number.saturating_add(1);
+        let wrong = |fault| TableError::Index { kind: RecordKind::Model, number, fault };
+        if entry.length == 0 {
+            let empty = Entry { offset: self.end, length: 0, checksum: 0 };
+            return if entry == empty { Ok(()) } else { Err(wrong(IndexFault::EmptyEntry)) };
+        }
+        let length = self.record(entry, MODEL_BYTES_LEAST as u32, MODEL_BYTES_MOST).map_err(wrong)?;
+        self.models = self.models.saturating_add(1);
+        self.longest.model = self.longest.model.max(length);
+        Ok(())
     }
 
     /// Where the last record ends.
@@ -117,14 +152,23 @@ impl IndexCheck {
         self.end
     }
 
-    /// After the last entry: the length of the longest record, if the last one ends at `file_length`.
-    pub(super) fn finish(&self, file_length: u32) -> Result<u32, TableError> {
+    fn walked(&mut self, length: Result<u32, IndexFault>) -> Result<(), IndexFault> {
+        self.longest.walked = self.longest.walked.max(length?);
+        Ok(())
+    }
+
+    /// After the last entry: the lengths of the longest records, if the last one ends at `file_length`.
+    pub(super) fn finish(&self, file_length: u32) -> Result<Longest, TableError> {
+        if self.has_models && self.models == 0 {
+            let number = self.landmark_count.saturating_sub(1);
+            return Err(TableError::Index { kind: RecordKind::Model, number, fault: IndexFault::NoModels });
+        }
         let fault = if self.with_views != self.landmark_count {
             IndexFault::LandmarkWithoutView { with_views: self.with_views, landmarks: self.landmark_count }
         } else if self.end != file_length {
             IndexFault::End { found: u64::from(self.end), file: file_length }
         } else {
-            return Ok(self.largest);
+            return Ok(self.longest);
         };
         Err(TableError::Index { kind: RecordKind::View, number: self.views.saturating_sub(1), fault })
     }
@@ -140,8 +184,8 @@ impl IndexCheck {
         Ok(())
     }
 
-    /// A record begins where the one before it ends.
-    fn record(&mut self, entry: Entry, least: u32, most: u32) -> Result<(), IndexFault> {
+    /// A record begins where the one before it ends. Returns its length.
+    fn record(&mut self, entry: Entry, least: u32, most: u32) -> Result<u32, IndexFault> {
         let Entry { offset, length, .. } = entry;
         if offset != self.end {
             return Err(IndexFault::Offset { found: offset, expected: self.end });
@@ -154,7 +198,6 @@ impl IndexCheck {
             file: self.file_length,
         })?;
         self.end = end;
-        self.largest = self.largest.max(length);
-        Ok(())
+        Ok(length)
     }
 }

@@ -1,12 +1,12 @@
 //! The reader from a stream: a table on a card or in serial flash, one record in memory at a time.
 
 use super::checksum::TableId;
-use super::in_place::{checked_landmark, checked_view, landmark_fault};
-use super::index::{Entry, IndexCheck, ViewEntry};
+use super::in_place::{checked_landmark, checked_model, checked_view, landmark_fault};
+use super::index::{Entry, IndexCheck, Longest, ViewEntry};
 use super::landmark::{LANDMARK_BYTES, LandmarkRecord, LastName};
 use super::{
-    HEADER_BYTES, Header, LANDMARK_ENTRY_BYTES, Landmark, RecordKind, StoredView, StreamError, TableError,
-    VIEW_ENTRY_BYTES, ViewSource,
+    HEADER_BYTES, Header, LANDMARK_ENTRY_BYTES, Landmark, MODEL_ENTRY_BYTES, RecordKind, StoredModel, StoredView,
+    StreamError, TableError, VIEW_ENTRY_BYTES, ViewSource,
 };
 use embedded_io::{Read, Seek, SeekFrom};
 
@@ -21,7 +21,7 @@ const ENTRIES: usize = 16;
 pub struct TableStream<R> {
     reader: R,
     header: Header,
-    longest_record: u32,
+    longest: Longest,
     /// Entries of the views from `cached_from` on.
     cached: [[u8; VIEW_ENTRY_BYTES]; ENTRIES],
     cached_from: u32,
@@ -46,19 +46,21 @@ impl<R: Read + Seek> TableStream<R> {
         header.check_length(available)?;
 
         let (cached, cached_from, cached_count) = ([[0; VIEW_ENTRY_BYTES]; ENTRIES], 0, 0);
-        let mut table = Self { reader, header, longest_record: 0, cached, cached_from, cached_count };
-        table.longest_record = table.check_index()?;
+        let mut table = Self { reader, header, longest: Longest::default(), cached, cached_from, cached_count };
+        table.longest = table.check_index()?;
         table.check_landmarks()?;
         Ok(table)
     }
 
-    /// Reads every view through `buffer`, and accepts the table or says what is wrong with the first record that is.
+    /// Reads every view and every model through `buffer`, and accepts the table or says what is wrong with the first record
+    /// that is. The buffer must take the models as well ([`TableStream::model_bytes`]).
     ///
     /// # Errors
     ///
     /// As [`TableStream::view`].
     pub fn verify(&mut self, buffer: &mut [u8]) -> Result<(), StreamError<R::Error>> {
-        (0..self.header.view_count()).try_for_each(|number| self.view(number, buffer).map(|_| ()))
+        (0..self.header.view_count()).try_for_each(|number| self.view(number, buffer).map(|_| ()))?;
+        (0..self.header.landmark_count()).try_for_each(|number| self.model(number, buffer).map(|_| ()))
     }
 
     /// The counts, limits and identity of the table.
@@ -66,9 +68,14 @@ impl<R: Read + Seek> TableStream<R> {
         &self.header
     }
 
-    /// Bytes of a buffer that takes any record of this table.
+    /// Bytes of a buffer that takes any landmark and any view of this table.
     pub const fn buffer_bytes(&self) -> usize {
-        self.longest_record as usize
+        self.longest.walked as usize
+    }
+
+    /// Bytes of a buffer that takes any model of this table; 0 if there is none.
+    pub const fn model_bytes(&self) -> usize {
+        self.longest.model as usize
     }
 
     /// Landmark `number`, read into `buffer`. Finding its views takes O(log views) reads of 16 bytes.
@@ -105,14 +112,44 @@ impl<R: Read + Seek> TableStream<R> {
         Ok(checked_view(&self.header, number, entry, record)?)
     }
 
+    /// The model of landmark `number`, read into `buffer`, if it has one.
+    ///
+    /// # Errors
+    ///
+    /// As [`TableStream::view`].
+    pub fn model<'b>(
+        &mut self,
+        number: u32,
+        buffer: &'b mut [u8],
+    ) -> Result<Option<StoredModel<'b>>, StreamError<R::Error>> {
+        let (kind, count) = (RecordKind::Landmark, self.header.landmark_count());
+        if number >= count {
+            return Err(TableError::NoSuchRecord { kind, number, count }.into());
+        }
+        if !self.header.has_models() {
+            return Ok(None);
+        }
+        let mut entry = [0; MODEL_ENTRY_BYTES];
+        let at = number.saturating_mul(MODEL_ENTRY_BYTES as u32).saturating_add(self.header.model_index_begin());
+        read_at(&mut self.reader, at, &mut entry)?;
+        let entry = Entry::from_bytes(&entry);
+        if entry.length == 0 {
+            return Ok(None);
+        }
+        let begin = self.first_view(number, 0)?;
+        let views = begin..self.first_view(number.saturating_add(1), begin)?;
+        let record = self.record(entry, buffer)?;
+        Ok(Some(checked_model(&self.header, number, views, entry, record, false)?))
+    }
+
     /// The source, for another use.
     pub fn into_inner(self) -> R {
         self.reader
     }
 
-    /// Goes through the index once, and returns the length of the longest record. Damage is reported before what
+    /// Goes through the index once, and returns the lengths of the longest records. Damage is reported before what
     /// does not fit together, as the reader in place does.
-    fn check_index(&mut self) -> Result<u32, StreamError<R::Error>> {
+    fn check_index(&mut self) -> Result<Longest, StreamError<R::Error>> {
         let header = self.header;
         let mut id = TableId::new();
         let mut check = IndexCheck::new(&header, header.file_length());
@@ -125,6 +162,11 @@ impl<R: Read + Seek> TableStream<R> {
         each_entry(&mut self.reader, header.view_index_begin(), header.view_count(), |bytes| {
             id.update(bytes);
             result = result.and_then(|()| check.view(ViewEntry::from_bytes(bytes)));
+        })?;
+        let models = if header.has_models() { header.landmark_count() } else { 0 };
+        each_entry(&mut self.reader, header.model_index_begin(), models, |bytes| {
+            id.update(bytes);
+            result = result.and_then(|()| check.model(Entry::from_bytes(bytes)));
         })?;
         header.check_id(id)?;
         Ok(result.and_then(|()| check.finish(header.file_length()))?)
@@ -220,6 +262,14 @@ where
 
     fn landmark<'s>(&'s mut self, number: u32, buffer: &'s mut [u8]) -> Result<Landmark<'s>, Self::Error> {
         TableStream::landmark(self, number, buffer)
+    }
+
+    fn model_bytes(&self) -> usize {
+        TableStream::model_bytes(self)
+    }
+
+    fn model<'s>(&'s mut self, number: u32, buffer: &'s mut [u8]) -> Result<Option<StoredModel<'s>>, Self::Error> {
+        TableStream::model(self, number, buffer)
     }
 }
 

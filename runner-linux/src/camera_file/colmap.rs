@@ -104,7 +104,16 @@ fn lens(model: &str, size: [u32; 2], p: &[f64]) -> Result<FileCamera, String> {
         _ => Distortion::None,
     };
     let centre = centre.map(|c| c - 0.5);
-    Ok(FileCamera { picture: None, size: Some(size), focal, centre, skew: 0.0, distortion, pose: None })
+    Ok(FileCamera {
+        picture: None,
+        size: Some(size),
+        focal,
+        centre,
+        skew: 0.0,
+        distortion,
+        focal_error: None,
+        pose: None,
+    })
 }
 
 fn lines(bytes: &[u8]) -> Result<impl Iterator<Item = &str>, String> {

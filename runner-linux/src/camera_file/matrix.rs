@@ -47,6 +47,7 @@ fn decompose(matrix: &Matrix3<f64>, last: &Vector3<f64>) -> Option<FileCamera> {
         centre: [cx, cy],
         skew,
         distortion: Distortion::None,
+        focal_error: None,
         pose: Some(Pose {
             view_from_model: Matrix3::from_rows(&[right.transpose(), down.transpose(), forward.transpose()]),
             position,

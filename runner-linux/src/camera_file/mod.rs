@@ -35,6 +35,8 @@ pub struct FileCamera {
     pub skew: f64,
     /// Distortion.
     pub distortion: Distortion,
+    /// Relative error of the focal length (one standard deviation), where the file says.
+    pub focal_error: Option<f64>,
     /// The place, where the file says.
     pub pose: Option<Pose>,
 }

@@ -31,6 +31,7 @@ pub fn parse(text: &str) -> Result<FileCamera, String> {
         centre: [all[2], all[5]],
         skew: all[1],
         distortion: Distortion::None,
+        focal_error: None,
         pose: Some(Pose { view_from_model: turn.transpose(), position: Vector3::new(all[21], all[22], all[23]) }),
     })
 }

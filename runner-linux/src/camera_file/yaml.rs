@@ -9,6 +9,8 @@ use super::distortion::Distortion;
 const MATRIX: [&str; 5] = ["camera_matrix", "cameraMatrix", "Camera_Matrix", "K", "intrinsics"];
 const COEFFICIENTS: [&str; 5] =
     ["distortion_coefficients", "distCoeffs", "Distortion_Coefficients", "dist_coeffs", "D"];
+/// The key of the focal length's relative error, one standard deviation.
+pub(crate) const FOCAL_ERROR: &str = "focal_length_relative_error";
 
 /// Reads the text of a file.
 ///
@@ -39,8 +41,18 @@ pub fn parse(text: &str) -> Result<FileCamera, String> {
         centre: [cx, cy],
         skew,
         distortion: distortion(model, &coefficients)?,
+        focal_error: focal_error(text)?,
         pose: None,
     })
+}
+
+/// A key of our own, which other readers pass over.
+fn focal_error(text: &str) -> Result<Option<f64>, String> {
+    let Some(value) = scalar(text, FOCAL_ERROR) else { return Ok(None) };
+    match value.parse::<f64>() {
+        Ok(error) if (0.0..1.0).contains(&error) => Ok(Some(error)),
+        _ => Err(format!("its {FOCAL_ERROR} is \"{value}\", not a number between 0 and 1")),
+    }
 }
 
 fn distortion(model: &str, coefficients: &[f64]) -> Result<Distortion, String> {

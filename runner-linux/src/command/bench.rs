@@ -173,6 +173,7 @@ fn made_table() -> Result<Vec<u8>, CommandError> {
         kind: Kind::Tower,
         position: None,
         views: vec![view],
+        model: None,
     };
     let landmarks = (1..=VIEWS).zip(views.into_iter().cycle()).map(landmark).collect();
     OwnedTable { profile, landmarks }.to_bytes().map_err(|error| error.to_string().into())

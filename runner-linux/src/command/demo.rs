@@ -127,6 +127,7 @@ fn save_table(path: &Path, towers: &[Tower; 8], enrolled: &[Enrolled]) -> Result
         kind: KINDS[index],
         position: scene::position(index),
         views: enrolled.iter().filter(|view| view.building == tower.name).map(|view| view.view.clone()).collect(),
+        model: None,
     };
     let landmarks = towers.iter().enumerate().map(landmark).collect();
     OwnedTable { profile: Profile::Handheld, landmarks }.save(path)?;
@@ -166,6 +167,7 @@ fn recognize_all(
             read_ms: ms(begin, read),
             features_ms: ms(read, extracted),
             matching_ms: ms(extracted, matched),
+            position_ms: 0.0,
         });
         let best = match &recognition.best {
             Some(best) => ViewExplanation::new(&mut engine, &table, best)?,

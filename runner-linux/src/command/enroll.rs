@@ -1,5 +1,6 @@
 //! `daymark enroll`: pictures of buildings go into a landmark table.
 
+mod models;
 mod report;
 
 use std::io::{self, ErrorKind, Write};
@@ -15,7 +16,7 @@ use super::{CommandError, Outcome};
 use crate::engine::{Engine, STACK_BYTES};
 use crate::enroll::lint::{LintError, ViewLint, lint};
 use crate::enroll::manifest;
-use crate::enroll::plan::{Plan, check_name, read_pictures};
+use crate::enroll::plan::{FACING_ERROR_DEGREES, Modelling, Plan, check_name, read_pictures};
 use crate::enroll::position::{GIVEN_ERROR_METRES, parse_degrees, position};
 use crate::enroll::update::{Change, Enrolled, apply};
 use crate::table_file::{OwnedTable, TableFileError, open_table, read_table, replace_file};
@@ -29,6 +30,8 @@ A manifest names buildings and their pictures, paths relative to the manifest:
   name = \"Old gate\"
   kind = \"tower\"             # optional
   at = [52.5163, 13.3777]    # optional
+  facing = 184               # optional: azimuth towards which the front looks
+  height_m = 26              # optional, or distance_m: what says how long a metre is
   images = [\"gate-1.jpg\", \"gate-2.jpg\"]
 
 All pictures are read before the table is replaced; if one cannot be used, nothing is written.")]
@@ -48,8 +51,30 @@ pub struct Args {
     /// How well that is known, in metres
     #[arg(long, value_name = "METRES", requires = "at", default_value_t = GIVEN_ERROR_METRES)]
     position_error: f64,
+    /// Azimuth towards which the front looks, degrees from north over east; with it and --at a frame tells where the observer
+    /// stands
+    #[arg(long, value_name = "DEGREES")]
+    facing: Option<f64>,
+    /// How well that is known, in degrees
+    #[arg(long, value_name = "DEGREES", requires = "facing", default_value_t = FACING_ERROR_DEGREES)]
+    facing_error: f64,
+    /// Metres between the cameras of the first two pictures, so that the model has a scale
+    #[arg(long, value_name = "METRES", conflicts_with = "height_m")]
+    distance_m: Option<f64>,
+    /// Metres from the lowest to the highest point that the pictures show, so that the model has a scale
+    #[arg(long, value_name = "METRES")]
+    height_m: Option<f64>,
+    /// Focal length in pixels of the pictures as they are, if their EXIF data do not say it
+    #[arg(long, value_name = "PIXELS", conflicts_with = "cameras")]
+    focal_px: Option<f64>,
+    /// Known cameras, as in `daymark synthesize`
+    #[arg(long, value_name = "PATHS", num_args = 1..)]
+    cameras: Vec<PathBuf>,
+    /// Make no model from several pictures: the building is recognized, and gives no position of the observer
+    #[arg(long)]
+    no_model: bool,
     /// Take many buildings from a TOML file instead
-    #[arg(long, value_name = "MANIFEST", conflicts_with_all = ["name", "kind", "at", "position_error", "images"])]
+    #[arg(long, value_name = "MANIFEST", conflicts_with_all = ["name", "kind", "at", "position_error", "images", "facing", "distance_m", "height_m", "focal_px", "cameras"])]
     manifest: Option<PathBuf>,
     /// Put the pictures in the place of the views that the building had
     #[arg(long)]
@@ -100,11 +125,16 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     let pictures = pool.install(|| read_pictures(&plans, profile, &|| progress.inc(1)))?;
     progress.finish_and_clear();
 
-    let changes: Vec<Change> = plans
+    let mut wishes: Vec<Modelling> = plans.iter().map(|plan| plan.modelling.clone()).collect();
+    wishes.iter_mut().for_each(|wish| wish.unwanted |= args.no_model);
+    let mut changes: Vec<Change> = plans
         .into_iter()
         .zip(pictures)
         .map(|(plan, pictures)| apply(&mut table, plan, pictures, args.replace))
         .collect();
+    let progress = progress_of("modelling", "buildings", changes.len());
+    let models = pool.install(|| models::add_models(&mut table, &mut changes, &wishes, &|| progress.inc(1)))?;
+    progress.finish_and_clear();
     let bytes = table.to_bytes().map_err(TableFileError::Build)?;
     let new = open_table(&args.table, &bytes)?;
     let lints = if args.no_lint { Vec::new() } else { pool.install(|| lint_all(new, &changes))? };
@@ -116,7 +146,7 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
         }
         replace_file(&args.table, &bytes)?;
     }
-    report::print(args.json, &args.table, new, &changes, &lints)?;
+    report::print(args.json, &args.table, new, &changes, &models, &lints)?;
     Ok(Outcome::Done)
 }
 
@@ -128,8 +158,23 @@ fn plans(args: &Args) -> Result<Vec<Plan>, CommandError> {
     let name = args.name.clone().unwrap_or_default();
     check_name(&name).map_err(|says| format!("the name {name:?} cannot be used: {says}"))?;
     let at = args.at.map(|Degrees([latitude, longitude])| position(latitude, longitude, args.position_error));
-    let plan =
-        Plan { name, kind: args.kind, position: at.transpose()?, images: args.images.clone(), origin: String::new() };
+    let modelling = Modelling {
+        unwanted: args.no_model,
+        cameras: args.cameras.clone(),
+        focal_px: args.focal_px,
+        distance_m: args.distance_m,
+        height_m: args.height_m,
+        facing: args.facing.map(|azimuth| [azimuth, args.facing_error]),
+    };
+    modelling.check()?;
+    let plan = Plan {
+        name,
+        kind: args.kind,
+        position: at.transpose()?,
+        images: args.images.clone(),
+        modelling,
+        origin: String::new(),
+    };
     Ok(vec![plan])
 }
 
@@ -197,11 +242,16 @@ fn lint_all(table: LandmarkTable<'_>, changes: &[Change]) -> Result<Vec<Vec<Opti
 
 /// A bar on standard error, if that is a terminal; nothing otherwise.
 fn progress(doing: &'static str, pictures: usize) -> ProgressBar {
-    if pictures < 2 {
+    progress_of(doing, "pictures", pictures)
+}
+
+fn progress_of(doing: &'static str, what: &str, count: usize) -> ProgressBar {
+    if count < 2 {
         return ProgressBar::hidden();
     }
-    let style = ProgressStyle::with_template("{prefix} {pos} of {len} pictures [{bar:30}] {eta} left");
-    let bar = ProgressBar::new(pictures as u64).with_prefix(doing);
+    let style =
+        ProgressStyle::with_template(&format!("{{prefix}} {{pos}} of {{len}} {what} [{{bar:30}}] {{eta}} left"));
+    let bar = ProgressBar::new(count as u64).with_prefix(doing);
     match style {
         Ok(style) => bar.with_style(style.progress_chars("=> ")),
         Err(_) => bar,

@@ -4,16 +4,21 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use daymark_core::fix::Fix;
 use daymark_core::table::LandmarkTable;
-use daymark_core::verdict::FalseAnswer;
+use daymark_core::verdict::{Answer, FalseAnswer, Verdict};
 use serde::Serialize;
 
 use super::{CommandError, Outcome};
 use crate::engine::{Engine, FRAME_SIDE};
+use crate::lens_source::{ExifFocal, LensArgs, LensChoice};
+use crate::observer::Locating;
 use crate::picture::{GrayImage, read_gray};
 use crate::report::explain::{Explained, ViewExplanation};
 use crate::report::finding::{Finding, Times, VerdictName};
+use crate::report::map::{Building, Observer, Plan};
 use crate::report::overlay::Overlay;
+use crate::report::position::ObserverFacts;
 use crate::report::text;
 use crate::table_file::{open_table, read_table};
 
@@ -43,6 +48,28 @@ pub struct Args {
     /// Draw the frame with its matched corners and the outline of the stored view; several frames are numbered out-1.svg...
     #[arg(long, value_name = "OUT.svg")]
     overlay: Option<PathBuf>,
+    /// Draw a plan of the building and where the observer stands; several frames are numbered out-1.svg...
+    #[arg(long, value_name = "OUT.svg")]
+    map: Option<PathBuf>,
+    #[command(flatten)]
+    lens: LensArgs,
+    /// A building is recognized from this far at most; where its distance is not known, the observer is within it
+    #[arg(long, value_name = "METRES", default_value_t = REACH_M, value_parser = reach)]
+    reach: f64,
+}
+
+/// A building is recognized from this far at most, if nobody says otherwise, metres.
+pub(super) const REACH_M: f64 = 100.0;
+
+/// A reach on the command line.
+///
+/// # Errors
+/// What is wrong with it.
+pub(super) fn reach(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value > 0.0 && value <= 100_000.0 => Ok(value),
+        _ => Err("give metres above 0 and at most 100000".to_owned()),
+    }
 }
 
 /// A probability on the command line: above 0, at most 1.
@@ -111,13 +138,15 @@ impl Summary {
 pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     let bytes = read_table(&args.table)?;
     let table = open_table(&args.table, &bytes)?;
-    let mut engine = Engine::new(table.profile());
+    let mut looking =
+        Looking { args, engine: Engine::new(table.profile()), locating: Locating::new(), lens: args.lens.read()? };
     let mut findings = Vec::new();
     let mut summary = Summary::default();
     let mut unreadable = None;
     for (number, path) in (1..).zip(&args.frames) {
-        let overlay = args.overlay.as_deref().map(|path| numbered(path, number, args.frames.len()));
-        let finding = look(args, &mut engine, table, path, overlay.as_deref())?;
+        let drawing = |path: &Path| numbered(path, number, args.frames.len());
+        let (overlay, map) = (args.overlay.as_deref().map(drawing), args.map.as_deref().map(drawing));
+        let finding = looking.look(table, path, overlay.as_deref(), map.as_deref())?;
         summary.enter(finding.verdict);
         if finding.verdict == VerdictName::Unreadable {
             unreadable = finding.reason.as_ref().map(|reason| reason.message.clone());
@@ -156,48 +185,93 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     }
 }
 
-/// One frame from its file to what is said about it.
-fn look(
-    args: &Args,
-    engine: &mut Engine,
-    mut table: LandmarkTable<'_>,
-    path: &Path,
-    overlay: Option<&Path>,
-) -> Result<Finding, CommandError> {
-    let begin = Instant::now();
-    let frame = match read_gray(path) {
-        Ok(image) => image.scaled_to(FRAME_SIDE),
-        Err(error) => {
-            // The only frame's error is the command's, which is printed at its end.
-            if args.frames.len() > 1 {
-                writeln!(io::stderr(), "error: {error}")?;
-            }
-            return Ok(Finding::unreadable(&error));
-        }
-    };
-    let read = Instant::now();
-    engine.extract(&frame).map_err(|error| format!("{}: {error}", path.display()))?;
-    let extracted = Instant::now();
-    let recognition = engine.recognize(&mut table, FalseAnswer::at_most(args.max_false_answer))?;
-    let matched = Instant::now();
+/// What looking at frames needs.
+struct Looking<'a> {
+    args: &'a Args,
+    engine: Engine,
+    locating: Locating,
+    lens: LensChoice,
+}
 
-    let mut finding = Finding::new(path, &frame, &recognition, &table)?;
-    let ms = |from: Instant, to: Instant| (to - from).as_secs_f64() * 1e3;
-    finding.times =
-        Some(Times { read_ms: ms(begin, read), features_ms: ms(read, extracted), matching_ms: ms(extracted, matched) });
-    if args.explain {
-        let (best, runner_up) = (recognition.best.as_ref(), recognition.runner_up.as_ref());
-        finding.explanation = Some(Explained::new(engine, &table, best, runner_up)?);
-    }
-    if let Some(file) = overlay {
-        let best = match &recognition.best {
-            Some(best) => ViewExplanation::new(engine, &table, best)?,
-            None => None,
+impl Looking<'_> {
+    /// One frame from its file to what is said about it.
+    fn look(
+        &mut self,
+        mut table: LandmarkTable<'_>,
+        path: &Path,
+        overlay: Option<&Path>,
+        map: Option<&Path>,
+    ) -> Result<Finding, CommandError> {
+        let Self { args, engine, locating, lens } = self;
+        let begin = Instant::now();
+        let (frame, size) = match read_gray(path) {
+            Ok(image) => {
+                let size = [image.width as u32, image.height as u32];
+                (image.scaled_to(FRAME_SIDE), size)
+            }
+            Err(error) => {
+                // The only frame's error is the command's, which is printed at its end.
+                if args.frames.len() > 1 {
+                    writeln!(io::stderr(), "error: {error}")?;
+                }
+                return Ok(Finding::unreadable(&error));
+            }
         };
-        draw(file, &frame, &finding, best.as_ref())?;
-        finding.overlay_file = Some(file.to_string_lossy().into_owned());
+        let read = Instant::now();
+        engine.extract(&frame).map_err(|error| format!("{}: {error}", path.display()))?;
+        let extracted = Instant::now();
+        let recognition = engine.recognize(&mut table, FalseAnswer::at_most(args.max_false_answer))?;
+        let matched = Instant::now();
+
+        let mut finding = Finding::new(path, &frame, &recognition, &table)?;
+        if let Verdict::Known(answer) = &recognition.verdict {
+            let exif = lens.asks_picture().then(|| ExifFocal::of_picture(path)).flatten();
+            let lens = lens.lens(size[0], size[1], exif.as_ref())?.scaled_to(frame.width as u32, frame.height as u32);
+            let observer = locating.observer(engine, &table, answer, &lens, args.reach)?;
+            finding.observer = Some(ObserverFacts::new(&observer, &lens));
+            if let (Some(file), Some(fix)) = (map, observer.fix) {
+                draw_map(file, &table, answer, fix.fix)?;
+                finding.map_file = Some(file.to_string_lossy().into_owned());
+            }
+        }
+        let located = Instant::now();
+        let ms = |from: Instant, to: Instant| (to - from).as_secs_f64() * 1e3;
+        finding.times = Some(Times {
+            read_ms: ms(begin, read),
+            features_ms: ms(read, extracted),
+            matching_ms: ms(extracted, matched),
+            position_ms: ms(matched, located),
+        });
+        if args.explain {
+            let (best, runner_up) = (recognition.best.as_ref(), recognition.runner_up.as_ref());
+            finding.explanation = Some(Explained::new(engine, &table, best, runner_up)?);
+        }
+        if let Some(file) = overlay {
+            let best = match &recognition.best {
+                Some(best) => ViewExplanation::new(engine, &table, best)?,
+                None => None,
+            };
+            draw(file, &frame, &finding, best.as_ref())?;
+            finding.overlay_file = Some(file.to_string_lossy().into_owned());
+        }
+        Ok(finding)
     }
-    Ok(finding)
+}
+
+/// The plan of the building and its observer.
+fn draw_map(file: &Path, table: &LandmarkTable<'_>, answer: &Answer, fix: Fix) -> Result<(), CommandError> {
+    let landmark = table.landmark(answer.landmark)?;
+    let Some(building) = Building::of(table, answer.landmark)? else { return Ok(()) };
+    let plan = Plan {
+        title: format!("{}, and where it is seen from", landmark.name),
+        buildings: vec![building],
+        observers: vec![Observer { fix, sees: Some(0) }],
+        way: Vec::new(),
+    };
+    std::fs::write(file, plan.to_svg().unwrap_or_default()).map_err(|error| {
+        format!("cannot write the map {}: {error}; give a path in a folder that exists and is yours", file.display())
+    })?;
+    Ok(())
 }
 
 fn draw(file: &Path, frame: &GrayImage, finding: &Finding, best: Option<&ViewExplanation>) -> Result<(), CommandError> {

@@ -1,6 +1,6 @@
 //! `daymark synthesize`: pictures in, a textured model out.
 
-mod cameras;
+pub(super) mod cameras;
 mod output;
 
 use std::io::{self, IsTerminal, Write};

@@ -15,6 +15,7 @@ use crate::frame::mock::{Mock, Planned};
 use crate::frame::pipe::{Content, Pipe};
 use crate::frame::v4l2::{Camera, Controls, list};
 use crate::frame::{Delivery, Opener};
+use crate::lens_source::LensArgs;
 use crate::log;
 use crate::output::target::{Sink, Target};
 use crate::output::{FormName, Wanted};
@@ -88,6 +89,12 @@ pub struct Args {
     #[arg(long, value_name = "METRES", default_value_t = 100.0, value_parser = rate)]
     reach: f64,
 
+    /// You move with up to about this speed; positions are averaged as far as that allows, and 0 is for a camera that stands
+    #[arg(long, value_name = "METRES_PER_SECOND", default_value_t = 2.0, value_parser = speed)]
+    speed: f64,
+    #[command(flatten)]
+    lens: LensArgs,
+
     /// What to write, and where: text, jsonl, nmea or geojson, then :- (standard output), :FILE, :/dev/ttyUSB0@4800 or
     /// :udp://HOST:PORT. May be given several times [default: text:-]
     #[arg(long, value_name = "FORM[:TARGET]")]
@@ -149,6 +156,13 @@ fn rate(text: &str) -> Result<f64, String> {
     }
 }
 
+fn speed(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if (0.0..=1_000.0).contains(&value) => Ok(value),
+        _ => Err("give metres a second between 0 and 1000".to_owned()),
+    }
+}
+
 /// Runs the command.
 ///
 /// # Errors
@@ -170,10 +184,11 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     let name = opener.name();
     let delivery = opener.delivery();
     let outputs = outputs(args, delivery == Delivery::Every)?;
-    let look = Recognizing::new(table, FalseAnswer::at_most(args.max_false_answer));
+    let limit = FalseAnswer::at_most(args.max_false_answer);
+    let look = Recognizing::new(table, limit, args.lens.read()?, args.reach);
     let run = Run {
         capture: Capture::start(opener, patience)?,
-        session: Session::new(look, args.max_false_answer, args.reach),
+        session: Session::new(look, args.max_false_answer, args.reach, args.speed),
         outputs,
         signals,
         reloader: Some(reloader),

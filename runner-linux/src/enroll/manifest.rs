@@ -6,6 +6,12 @@
 //! kind = "tower"              # optional
 //! at = [52.5163, 13.3777]     # optional: degrees north, degrees east
 //! position_error = 20         # optional: metres
+//! facing = 184                # optional: azimuth towards which the front looks, degrees
+//! facing_error = 5            # optional: degrees
+//! cameras = ["cameras.yaml"]  # optional: as in `daymark synthesize`
+//! focal_px = 3100             # optional, if EXIF data do not say it
+//! distance_m = 12.5           # optional: between the first two cameras; or
+//! height_m = 31               # optional: of what the pictures show
 //! images = ["gate-1.jpg", "gate-2.jpg"]
 //! ```
 //!
@@ -20,7 +26,7 @@ use daymark_core::table::Kind;
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::plan::{Plan, check_name};
+use super::plan::{FACING_ERROR_DEGREES, Modelling, Plan, check_name};
 use super::position::{GIVEN_ERROR_METRES, position};
 
 #[derive(Deserialize)]
@@ -38,6 +44,13 @@ struct Building {
     at: Option<Spanned<[f64; 2]>>,
     position_error: Option<Spanned<f64>>,
     images: Spanned<Vec<PathBuf>>,
+    facing: Option<f64>,
+    facing_error: Option<f64>,
+    #[serde(default)]
+    cameras: Vec<PathBuf>,
+    focal_px: Option<f64>,
+    distance_m: Option<f64>,
+    height_m: Option<f64>,
 }
 
 /// Reads a manifest: one plan for each building, in its order.
@@ -72,7 +85,9 @@ fn parse(path: &Path, text: &str) -> Result<Vec<Plan>, ManifestError> {
     let folder = path.parent().unwrap_or(Path::new(""));
     let mut lines = BTreeMap::new();
     let mut plans = Vec::new();
-    for Building { name, kind, at, position_error, images } in manifest.building {
+    for building in manifest.building {
+        let modelling = modelling(&building, folder);
+        let Building { name, kind, at, position_error, images, .. } = building;
         let line = line_of(name.span());
         let name = name.into_inner();
         let wrong = |span, says: &str| fail(Some(line_of(span)), format!("building {name:?}: {says}"));
@@ -101,7 +116,9 @@ fn parse(path: &Path, text: &str) -> Result<Vec<Plan>, ManifestError> {
         if images.get_ref().is_empty() {
             return Err(wrong(images.span(), "it has no pictures; name at least one in images"));
         }
+        modelling.check().map_err(|says| fail(Some(line), format!("building {name:?}: {says}")))?;
         plans.push(Plan {
+            modelling,
             kind: kind.transpose()?,
             position: place,
             images: images.into_inner().into_iter().map(|image| folder.join(image)).collect(),
@@ -110,6 +127,17 @@ fn parse(path: &Path, text: &str) -> Result<Vec<Plan>, ManifestError> {
         });
     }
     Ok(plans)
+}
+
+fn modelling(building: &Building, folder: &Path) -> Modelling {
+    Modelling {
+        unwanted: false,
+        cameras: building.cameras.iter().map(|path| folder.join(path)).collect(),
+        focal_px: building.focal_px,
+        distance_m: building.distance_m,
+        height_m: building.height_m,
+        facing: building.facing.map(|azimuth| [azimuth, building.facing_error.unwrap_or(FACING_ERROR_DEGREES)]),
+    }
 }
 
 /// A manifest that cannot be followed. Nothing was enrolled.

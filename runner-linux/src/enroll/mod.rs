@@ -2,18 +2,20 @@
 //!
 //! ```text
 //! manifest ─┐
-//!           ├─> plan ──> select, simulate ──> view ──> update ──> lint ──> advice
-//! position ─┘    read pictures, in parallel            table      new views
+//!           ├─> plan ──> select, simulate ──> view ──> update ──> model ──> lint ──> advice
+//! position ─┘    read pictures, in parallel            table     (upright)  new views
 //! ```
 
 pub mod advice;
 pub mod lint;
 pub mod manifest;
+pub mod model;
 pub mod plan;
 pub mod position;
 pub mod select;
 pub mod simulate;
 pub mod update;
+pub mod upright;
 mod view;
 
 pub use view::{TooFewCorners, view};

@@ -26,8 +26,56 @@ pub struct Plan {
     pub position: Option<GeoPosition>,
     /// Its pictures.
     pub images: Vec<PathBuf>,
+    /// What is known for its model.
+    pub modelling: Modelling,
     /// Where the plan stands, to begin a message with; empty for the command line.
     pub origin: String,
+}
+
+/// What is known for a building's model, beside its pictures.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Modelling {
+    /// Nobody wants a model.
+    pub unwanted: bool,
+    /// Files of cameras.
+    pub cameras: Vec<PathBuf>,
+    /// Focal length, pixels of the pictures as they are.
+    pub focal_px: Option<f64>,
+    /// Metres between the cameras of the first two pictures.
+    pub distance_m: Option<f64>,
+    /// Metres from the lowest to the highest point of what the pictures show.
+    pub height_m: Option<f64>,
+    /// Azimuth towards which the front looks and its deviation, degrees.
+    pub facing: Option<[f64; 2]>,
+}
+
+/// How well an azimuth is known if nobody says: a map or a compass tells it to that, degrees.
+pub const FACING_ERROR_DEGREES: f64 = 5.0;
+
+impl Modelling {
+    /// Whether the numbers can be.
+    ///
+    /// # Errors
+    /// What is wrong.
+    pub fn check(&self) -> Result<(), String> {
+        for (what, metres) in [("distance", self.distance_m), ("height", self.height_m)] {
+            if let Some(metres) = metres.filter(|metres| !(*metres > 0.0 && *metres < 1e5)) {
+                return Err(format!("{metres} m is no {what} at a building"));
+            }
+        }
+        if self.distance_m.is_some() && self.height_m.is_some() {
+            return Err("a distance and a height are two scales: give one of them".to_owned());
+        }
+        match self.facing {
+            Some([degrees, _]) if !(0.0..=360.0).contains(&degrees) => {
+                Err(format!("an azimuth of {degrees} degrees: give 0 to 360, from north over east"))
+            }
+            Some([_, deviation]) if !(0.0..=180.0).contains(&deviation) => {
+                Err(format!("an azimuth that is uncertain by {deviation} degrees: give 0 to 180"))
+            }
+            _ => Ok(()),
+        }
+    }
 }
 
 /// A picture that is read and fit to be a view.

@@ -39,6 +39,8 @@ pub struct Enrolled {
     pub place: usize,
     /// The table held exactly this view already.
     pub known: bool,
+    /// Where the camera stood, if the file says so.
+    pub camera: Option<GeoPosition>,
 }
 
 /// What happened to a building.
@@ -63,6 +65,8 @@ pub enum PositionFrom {
     Table,
     /// It is the camera's place as this picture says.
     Camera(PathBuf),
+    /// The places of several cameras, and where the building stands to them.
+    Cameras,
 }
 
 /// Puts the pictures of a plan into the table. With `replace`, they replace the views that the building had.
@@ -74,6 +78,7 @@ pub fn apply(table: &mut OwnedTable, plan: Plan, pictures: Vec<Picture>, replace
             kind: plan.kind.unwrap_or(KIND),
             position: None,
             views: Vec::new(),
+            model: None,
         };
         table.landmarks.push(entry);
         table.landmarks.len() - 1
@@ -90,15 +95,18 @@ pub fn apply(table: &mut OwnedTable, plan: Plan, pictures: Vec<Picture>, replace
     landmark.position = position.as_ref().map(|(at, _)| *at);
 
     let before = if replace { std::mem::take(&mut landmark.views) } else { landmark.views.clone() };
+    if replace {
+        landmark.model = None;
+    }
     let mut enrolled = Vec::new();
-    for Picture { path, gray, view, .. } in pictures {
+    for Picture { path, gray, view, camera } in pictures {
         let corners = view.features.len();
         let found = landmark.views.iter().position(|other| is_same(other, &view));
         let place = found.unwrap_or(landmark.views.len());
         if found.is_none() {
             landmark.views.push(view);
         }
-        enrolled.push(Enrolled { path, gray, corners, place, known: found.is_some() });
+        enrolled.push(Enrolled { path, gray, corners, place, known: found.is_some(), camera });
     }
     let same = before.len() == landmark.views.len() && before.iter().zip(&landmark.views).all(|(a, b)| is_same(a, b));
     let outcome = match (views_before, replace) {

@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use super::Form;
+use super::fix::FixMethod;
 use super::record::{Answer, CameraState, Counters, EndReason, Moment, Reason, Record};
 use crate::report::phrase::{count, grouped, printable, probability};
 use crate::watch::quality::Quality;
@@ -62,6 +63,10 @@ fn write_answer(line: &mut String, answer: &Answer) -> std::fmt::Result {
     write!(line, ": false with a probability of {}, by {frames}", probability(answer.probability_false_answer))?;
     if let Some(at) = &answer.position {
         write!(line, "; it stands at {:.6}, {:.6}", at.latitude_deg, at.longitude_deg)?;
+    }
+    if let Some(fix) = answer.fix.filter(|fix| fix.method != FixMethod::NearLandmark) {
+        let within = fix.radius_95_m;
+        write!(line, "; you are at {:.6}, {:.6} within {within:.1} m", fix.latitude_deg, fix.longitude_deg)?;
     }
     writeln!(line)
 }

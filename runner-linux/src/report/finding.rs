@@ -9,6 +9,7 @@ use serde::Serialize;
 
 use super::explain::Explained;
 use super::phrase;
+use super::position::ObserverFacts;
 use crate::picture::{GrayImage, PictureError};
 
 /// The verdict on a frame, by name.
@@ -89,6 +90,8 @@ pub struct Times {
     pub features_ms: f64,
     /// Comparing with every view of the table.
     pub matching_ms: f64,
+    /// Finding out where the observer stands.
+    pub position_ms: f64,
 }
 
 /// Everything that is said about one frame; serialized, it is its part of the JSON.
@@ -116,12 +119,16 @@ pub struct Finding {
     pub corners: usize,
     /// Views that the frame was compared with.
     pub views_compared: u32,
+    /// Where the observer stands, if the landmark is known.
+    pub observer: Option<ObserverFacts>,
     /// Where the time went.
     pub times: Option<Times>,
     /// What each stored corner said, if it was asked.
     pub explanation: Option<Explained>,
     /// The picture of the finding, if it was asked for.
     pub overlay_file: Option<String>,
+    /// The plan of building and observer, if it was asked for and there is a position.
+    pub map_file: Option<String>,
 }
 
 impl Candidate {
@@ -180,9 +187,11 @@ impl Finding {
             height_px: frame.height,
             corners: recognition.corners,
             views_compared: recognition.views,
+            observer: None,
             times: None,
             explanation: None,
             overlay_file: None,
+            map_file: None,
         })
     }
 
@@ -204,9 +213,11 @@ impl Finding {
             height_px: 0,
             corners: 0,
             views_compared: 0,
+            observer: None,
             times: None,
             explanation: None,
             overlay_file: None,
+            map_file: None,
         }
     }
 }

@@ -3,6 +3,9 @@
 //! North is up. Everything is given as WGS84 and drawn in the east-north-up frame of the middle of the buildings.
 
 use daymark_core::fix::{Fix, LocalFrame, Wgs84};
+use daymark_core::geometry::hull::{ConvexHull, Hull};
+use daymark_core::point::ImagePoint;
+use daymark_core::table::{LandmarkTable, POINTS_LIMIT, TableError};
 use svg::Document;
 use svg::node::element::{Circle, Ellipse, Group, Line, Path, Polygon, Polyline, Rectangle, Text};
 
@@ -27,6 +30,40 @@ pub struct Building {
     pub position: Wgs84,
     /// Its outline on the ground, if that is known; otherwise a small square is drawn.
     pub outline: Vec<Wgs84>,
+}
+
+impl Building {
+    /// A landmark of a table; its outline is what its model stands on, if it has one in metres that is turned to north. `None` if
+    /// nobody said where it stands.
+    ///
+    /// # Errors
+    /// A damaged record; not of a verified table.
+    pub fn of(table: &LandmarkTable<'_>, number: u32) -> Result<Option<Self>, TableError> {
+        let landmark = table.landmark(number)?;
+        let Some(at) = landmark.position else { return Ok(None) };
+        let model = table.model(number)?;
+        let model = model.filter(|model| model.facts().scale_error.is_some() && model.facts().azimuth.is_some());
+        let site = crate::observer::site(at, model.as_ref());
+        let frame = LocalFrame::new(site.position);
+        let ground = model.iter().flat_map(daymark_core::table::StoredModel::points).map(|point| {
+            let [east, north, _] = site.point_in(&frame, point.position);
+            [east, north]
+        });
+        let outline = hull(&ground.collect::<Vec<_>>());
+        let outline = outline.into_iter().map(|[east, north]| frame.wgs84_from_local([east, north, 0.0])).collect();
+        Ok(Some(Self { name: landmark.name.to_owned(), position: site.position, outline }))
+    }
+}
+
+/// The convex hull of places in metres, to the centimetre.
+fn hull(points: &[[f64; 2]]) -> Vec<[f64; 2]> {
+    let centimetres = |metres: f64| libm::round(metres * 100.0) as i32;
+    let places: Vec<_> = points.iter().map(|[x, y]| ImagePoint::new(centimetres(*x), centimetres(*y))).collect();
+    let mut hull = Box::new(ConvexHull::<{ POINTS_LIMIT as usize }>::new());
+    match hull.enclose(&places) {
+        Ok(Hull::Polygon(numbers)) => numbers.iter().map(|number| points[usize::from(*number)]).collect(),
+        _ => Vec::new(),
+    }
 }
 
 /// An observer of the plan.

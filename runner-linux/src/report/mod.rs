@@ -13,4 +13,5 @@ pub mod overlay;
 pub mod page;
 pub mod phrase;
 pub mod plot;
+pub mod position;
 pub mod text;

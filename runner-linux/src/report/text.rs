@@ -45,6 +45,9 @@ fn write_finding(out: &mut String, finding: &Finding, max_false_answer: f64) -> 
         let within = if at.error_m > 0.0 { format!(", within {} m", at.error_m) } else { String::new() };
         writeln!(out, "  stands at   {latitude:.6}, {longitude:.6} degrees{within}")?;
     }
+    if let Some(observer) = &finding.observer {
+        observer.write(out)?;
+    }
     if let Some(times) = finding.times {
         writeln!(
             out,
@@ -57,6 +60,9 @@ fn write_finding(out: &mut String, finding: &Finding, max_false_answer: f64) -> 
     }
     if let Some(file) = &finding.overlay_file {
         writeln!(out, "  overlay     {}", printable(file))?;
+    }
+    if let Some(file) = &finding.map_file {
+        writeln!(out, "  map         {}", printable(file))?;
     }
     Ok(())
 }

@@ -13,6 +13,8 @@ use crate::classify::cloud::Similarity;
 pub enum Scale {
     /// Nothing: lengths are multiples of the distance between the first two cameras.
     None,
+    /// This many metres are one unit.
+    Factor(f64),
     /// The distance between the first two views' cameras, metres.
     Distance(f64),
     /// The height of what the model shows, metres.
@@ -48,6 +50,7 @@ pub fn upright(made: &Reconstruction, scale: &Scale) -> Option<Similarity> {
     let apart = |a: usize, b: usize| Some((centre(a)? - centre(b)?).norm());
     let factor = match scale {
         Scale::None => 1.0 / apart(0, 1).filter(|length| *length > 0.0).unwrap_or(1.0),
+        Scale::Factor(factor) => *factor,
         Scale::Distance(metres) => metres / apart(0, 1)?,
         Scale::Height(metres) => metres / (range(2)[1] - range(2)[0]),
         Scale::Places(places) => {

@@ -61,6 +61,8 @@ pub struct Stages {
     pub features: Histogram,
     /// Comparing with every view of the table.
     pub matching: Histogram,
+    /// Finding out where the observer stands.
+    pub position: Histogram,
     /// Adding up the evidence and writing the records.
     pub tell: Histogram,
     /// From the frame's arrival to the answer, decoding included.
@@ -76,6 +78,7 @@ impl Stages {
             ("prepare", &self.prepare),
             ("features", &self.features),
             ("matching", &self.matching),
+            ("position", &self.position),
             ("tell", &self.tell),
             ("frame_to_answer", &self.all),
         ];

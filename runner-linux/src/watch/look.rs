@@ -3,12 +3,14 @@
 use std::fmt;
 use std::time::{Duration, Instant};
 
-use daymark_core::verdict::{FalseAnswer, Recognition};
+use daymark_core::verdict::{FalseAnswer, Recognition, Verdict};
 
 use super::quality::{Quality, quality};
 use super::scene::Scene;
 use super::table::{Landmark, LiveTable};
 use crate::engine::{Engine, FRAME_SIDE};
+use crate::lens_source::LensChoice;
+use crate::observer::{Locating, Sighted};
 use crate::output::record::TableFacts;
 use crate::picture::GrayImage;
 
@@ -21,6 +23,8 @@ pub struct Seen {
     pub quality: Quality,
     /// It is another scene than the frame before.
     pub new_scene: bool,
+    /// Where the observer stands, if the frame alone shows a known landmark.
+    pub observer: Option<Sighted>,
     /// How long it took.
     pub times: LookTimes,
 }
@@ -34,6 +38,8 @@ pub struct LookTimes {
     pub features: Duration,
     /// Comparing with the table.
     pub matching: Duration,
+    /// Finding out where the observer stands.
+    pub position: Duration,
 }
 
 /// Whatever can look at a frame.
@@ -66,6 +72,9 @@ pub struct Recognizing {
     table: LiveTable,
     scene: Scene,
     limit: FalseAnswer,
+    locating: Locating,
+    lens: LensChoice,
+    reach_m: f64,
 }
 
 impl fmt::Debug for Recognizing {
@@ -75,15 +84,25 @@ impl fmt::Debug for Recognizing {
 }
 
 impl Recognizing {
-    /// With a table; a frame alone is known if false with at most `limit`.
-    pub fn new(table: LiveTable, limit: FalseAnswer) -> Self {
-        Self { engine: Engine::new(table.table().profile()), table, scene: Scene::default(), limit }
+    /// With a table; a frame alone is known if false with at most `limit`. A landmark is recognized from `reach_m` metres at
+    /// most.
+    pub fn new(table: LiveTable, limit: FalseAnswer, lens: LensChoice, reach_m: f64) -> Self {
+        Self {
+            engine: Engine::new(table.table().profile()),
+            table,
+            scene: Scene::default(),
+            limit,
+            locating: Locating::new(),
+            lens,
+            reach_m,
+        }
     }
 }
 
 impl Look for Recognizing {
     fn look(&mut self, frame: GrayImage) -> Result<Seen, String> {
         let begin = Instant::now();
+        let size = [frame.width, frame.height].map(|side| side as u32);
         let frame = frame.scaled_to(FRAME_SIDE);
         let (quality, new_scene) = (quality(&frame), self.scene.enter(&frame));
         let prepared = Instant::now();
@@ -91,9 +110,23 @@ impl Look for Recognizing {
         let extracted = Instant::now();
         let mut table = self.table.table();
         let recognition = self.engine.recognize(&mut table, self.limit).map_err(|error| error.to_string())?;
-        let times =
-            LookTimes { prepare: prepared - begin, features: extracted - prepared, matching: extracted.elapsed() };
-        Ok(Seen { recognition, quality, new_scene, times })
+        let matched = Instant::now();
+        let observer = match &recognition.verdict {
+            Verdict::Known(answer) => {
+                let lens = self.lens.lens(size[0], size[1], None).map_err(|error| error.to_string())?;
+                let lens = lens.scaled_to(frame.width as u32, frame.height as u32);
+                let observer = self.locating.observer(&mut self.engine, &table, answer, &lens, self.reach_m);
+                observer.map_err(|error| error.to_string())?.fix
+            }
+            _ => None,
+        };
+        let times = LookTimes {
+            prepare: prepared - begin,
+            features: extracted - prepared,
+            matching: matched - extracted,
+            position: matched.elapsed(),
+        };
+        Ok(Seen { recognition, quality, new_scene, observer, times })
     }
 
     fn landmark(&self, number: u32) -> Option<Landmark> {

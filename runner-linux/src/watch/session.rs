@@ -5,10 +5,12 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::time::Instant;
 
+use daymark_core::fix::Wgs84;
 use daymark_core::over_frames::{Belief, Change, EvidenceOverFrames, Withdrawal};
 use daymark_core::verdict::{FalseAnswer, Verdict};
 
 use super::counters::{Stages, resident_bytes};
+use super::follow::Following;
 use super::look::{Look, Seen};
 use super::quality::Quality;
 use super::table::{Landmark, LiveTable};
@@ -34,6 +36,7 @@ pub struct Session<L> {
     reach_m: f64,
     /// The standing answer's landmark, and when it was told.
     standing: Option<(Landmark, f64)>,
+    following: Following,
     latest: Moment,
     looked_at: u64,
     answers: u64,
@@ -49,14 +52,15 @@ impl<L> fmt::Debug for Session<L> {
 
 impl<L: Look> Session<L> {
     /// Before the first frame. An answer is given if it is false with a probability of at most `max_false_answer`; a
-    /// landmark is recognized from `reach_m` metres at most.
-    pub fn new(look: L, max_false_answer: f64, reach_m: f64) -> Self {
+    /// landmark is recognized from `reach_m` metres at most; the observer moves with up to about `speed_m_s`.
+    pub fn new(look: L, max_false_answer: f64, reach_m: f64, speed_m_s: f64) -> Self {
         Self {
             look,
             evidence: EvidenceOverFrames::new(FalseAnswer::at_most(max_false_answer)),
             max_false_answer,
             reach_m,
             standing: None,
+            following: Following::new(speed_m_s),
             latest: Moment { frame: 0, time_s: 0.0, utc_s: None },
             looked_at: 0,
             answers: 0,
@@ -91,6 +95,10 @@ impl<L: Look> Session<L> {
 
         if seen.new_scene {
             self.evidence.new_scene();
+            self.following.forget();
+        }
+        if let (Some(sighted), Verdict::Known(answer)) = (&seen.observer, &seen.recognition.verdict) {
+            self.following.seen(answer.landmark, sighted, self.latest.time_s);
         }
         let usable = seen.quality == Quality::Good || matches!(seen.recognition.verdict, Verdict::Known(_));
         let change = if usable { self.evidence.frame(&seen.recognition) } else { self.evidence.unusable() };
@@ -103,6 +111,7 @@ impl<L: Look> Session<L> {
         self.stages.prepare.enter(seen.times.prepare);
         self.stages.features.enter(seen.times.features);
         self.stages.matching.enter(seen.times.matching);
+        self.stages.position.enter(seen.times.position);
         self.stages.tell.enter(looked.elapsed());
         self.stages.all.enter(arrived.elapsed() + decode);
         Ok(records)
@@ -177,7 +186,15 @@ impl<L: Look> Session<L> {
             evidence_bits: bits(belief.evidence),
             frames: belief.frames,
             position: landmark.position,
-            fix: landmark.position.map(|position| Fix::near(&position, self.reach_m)),
+            fix: landmark.position.map(|position| {
+                let place = Wgs84 {
+                    latitude_deg: position.latitude_deg,
+                    longitude_deg: position.longitude_deg,
+                    altitude_m: 0.0,
+                };
+                let followed = self.following.fix(belief.landmark, place, self.latest.time_s);
+                followed.map_or_else(|| Fix::near(&position, self.reach_m), |fix| Fix::of(&fix))
+            }),
             repeated,
         })
     }
@@ -190,6 +207,7 @@ impl<L: Look> Session<L> {
         let (record, reason) = match tidings {
             Tidings::Opened(what) => {
                 self.look.forget_scene();
+                self.following.forget();
                 (camera(CameraState::Opened, None, what, 0, None), None)
             }
             Tidings::LeftOut { fault, in_a_row } => {
@@ -222,6 +240,7 @@ impl<L: Look> Session<L> {
                 self.look.exchange(table);
                 let look = &self.look;
                 let change = self.evidence.renumber(|old| look.number(followed.get(&old)?));
+                self.following.renumber(|old| look.number(followed.get(&old)?));
                 let change = self.told(change, Some(Reason::NotInTable));
                 let accepted = TableChange { table: self.look.facts(), accepted: true, error: None };
                 return std::iter::once(Record::Table(accepted)).chain(change).collect();

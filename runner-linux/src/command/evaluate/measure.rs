@@ -118,6 +118,7 @@ pub(super) fn enroll(dataset: &Dataset, profile: Profile) -> Result<Gallery, Com
         kind: Kind::Building,
         position: None,
         views: views.into_iter().map(|(view, _)| view).collect(),
+        model: None,
     };
     let table = OwnedTable { profile, landmarks: landmarks.into_iter().map(entry).collect() };
     Ok(Gallery { bytes: table.to_bytes()?, views, not_enrolled, enroll_ms })

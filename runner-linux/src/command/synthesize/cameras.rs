@@ -1,24 +1,20 @@
 //! What is known of the cameras: their files, a focal length on the command line, or EXIF.
 
-use std::fs::File;
-use std::io::BufReader;
 use std::path::{Path, PathBuf};
-
-use exif::{In, Tag, Value};
 
 use crate::camera_file::lens::{Lens, Pose};
 use crate::camera_file::{CameraFileError, FileCamera, cameras as read};
 use crate::command::CommandError;
+use crate::enroll::position;
+use crate::lens_source::ExifFocal;
 use crate::synthesize::reconstruct::Cameras;
 use crate::synthesize::view::View;
 
-/// Width of a 35 mm film's picture, millimetres.
-const FILM_WIDTH_MM: f64 = 36.0;
 /// Metres in one degree of latitude.
 const METRES_PER_DEGREE: f64 = 111_195.0;
 
 /// The lens of each picture (for its own size), and the places if they are known.
-pub(super) fn cameras(
+pub(in crate::command) fn cameras(
     images: &[PathBuf],
     sizes: &[[u32; 2]],
     files: &[PathBuf],
@@ -36,7 +32,11 @@ pub(super) fn cameras(
         let lenses = sizes.iter().map(|&[width, height]| Lens::of_focal(width, height, focal)).collect();
         return Ok((lenses, Cameras::Unknown { free_lens: !fixed_lens }));
     }
-    let focal: Vec<Option<f64>> = images.iter().map(|path| film_focal(path)).collect();
+    let focal: Vec<Option<f64>> = images
+        .iter()
+        .zip(sizes)
+        .map(|(path, &[width, height])| Some(ExifFocal::of_picture(path)?.in_pixels(width, height)?.0))
+        .collect();
     if focal.iter().any(Option::is_none) {
         // Nothing is known: affine cameras need no focal length. Any number keeps the lens a lens.
         let lenses = sizes.iter().map(|&[width, height]| Lens::of_focal(width, height, f64::from(width.max(height))));
@@ -46,9 +46,7 @@ pub(super) fn cameras(
         .into_iter()
         .flatten()
         .zip(sizes)
-        .map(|(film, &[width, height])| {
-            Lens::of_focal(width, height, film / FILM_WIDTH_MM * f64::from(width.max(height)))
-        })
+        .map(|(focal, &[width, height])| Lens::of_focal(width, height, focal))
         .collect();
     // EXIF rounds to a millimetre.
     Ok((lenses, Cameras::Unknown { free_lens: !fixed_lens }))
@@ -108,18 +106,6 @@ fn from_files(images: &[PathBuf], sizes: &[[u32; 2]], files: &[PathBuf]) -> Resu
     Ok((lenses, Cameras::Unknown { free_lens: false }))
 }
 
-fn exif_of(path: &Path) -> Option<exif::Exif> {
-    exif::Reader::new().read_from_container(&mut BufReader::new(File::open(path).ok()?)).ok()
-}
-
-/// The focal length in millimetres of 35 mm film.
-fn film_focal(path: &Path) -> Option<f64> {
-    let exif = exif_of(path)?;
-    let field = exif.get_field(Tag::FocalLengthIn35mmFilm, In::PRIMARY)?;
-    let film = f64::from(field.value.get_uint(0)?);
-    (film > 0.0).then_some(film)
-}
-
 /// Where pictures were taken by their EXIF: metres east and north of the first that says it.
 pub(super) fn places(images: &[PathBuf]) -> Vec<Option<[f64; 2]>> {
     let degrees: Vec<Option<[f64; 2]>> = images.iter().map(|path| gps(path)).collect();
@@ -135,17 +121,6 @@ pub(super) fn places(images: &[PathBuf]) -> Vec<Option<[f64; 2]>> {
 }
 
 fn gps(path: &Path) -> Option<[f64; 2]> {
-    let exif = exif_of(path)?;
-    let part = |tag, side, negative: u8| {
-        let Value::Rational(values) = &exif.get_field(tag, In::PRIMARY)?.value else { return None };
-        let [degrees, minutes, seconds] = values.get(..3)? else { return None };
-        let size = degrees.to_f64() + minutes.to_f64() / 60.0 + seconds.to_f64() / 3_600.0;
-        let Value::Ascii(texts) = &exif.get_field(side, In::PRIMARY)?.value else { return None };
-        let sign = if *texts.first()?.first()? == negative { -1.0 } else { 1.0 };
-        size.is_finite().then_some(sign * size)
-    };
-    let latitude = part(Tag::GPSLatitude, Tag::GPSLatitudeRef, b'S')?;
-    let longitude = part(Tag::GPSLongitude, Tag::GPSLongitudeRef, b'W')?;
-    // Cameras without a fix write zeros.
-    (latitude != 0.0 || longitude != 0.0).then_some([latitude, longitude])
+    let at = position::of_camera(path)?;
+    Some([f64::from(at.latitude_e7) / 1e7, f64::from(at.longitude_e7) / 1e7])
 }

@@ -4,8 +4,8 @@ use std::path::Path;
 
 use daymark_core::feature::Feature;
 use daymark_core::table::{
-    CORNER_BYTES, FORMAT_VERSION, GeoPosition, Header, LANDMARK_BYTES, LANDMARK_ENTRY_BYTES, LEVELS, Landmark,
-    LandmarkTable, StoredView, TableError, VIEW_ENTRY_BYTES, VIEW_HEADER_BYTES, encode_landmark, encode_view,
+    CORNER_BYTES, GeoPosition, Header, LANDMARK_BYTES, LANDMARK_ENTRY_BYTES, LEVELS, Landmark, LandmarkTable,
+    StoredView, TableError, VIEW_ENTRY_BYTES, VIEW_HEADER_BYTES, encode_landmark, encode_view,
 };
 use serde::Serialize;
 
@@ -31,8 +31,7 @@ impl TableFacts {
     pub(in crate::command) fn new(path: &Path, header: &Header) -> Self {
         Self {
             file: path.to_string_lossy().into_owned(),
-            // Older versions are none; newer ones are not read.
-            format_version: FORMAT_VERSION,
+            format_version: header.version(),
             table_id: format!("{:016x}", header.table_id()),
             profile: header.profile().name(),
             landmarks: header.landmark_count(),
