@@ -60,6 +60,7 @@ pub fn read(bytes: &[u8], beside: impl Fn(&str) -> Result<Vec<u8>, String>) -> R
     for (number, line) in (1..).zip(text.lines()) {
         let wrong = |what: &str| format!("line {number}: {what}");
         let mut words = line.split_ascii_whitespace();
+        let rest = line.trim().split_once(char::is_whitespace).map(|(_, rest)| rest.trim());
         match words.next() {
             Some("v") => {
                 positions.push(numbers(words).ok_or_else(|| wrong("a point is not three numbers"))?);
@@ -67,10 +68,10 @@ pub fn read(bytes: &[u8], beside: impl Fn(&str) -> Result<Vec<u8>, String>) -> R
             }
             Some("vt") => uv.push(numbers(words).ok_or_else(|| wrong("a texture coordinate is not two numbers"))?),
             Some("mtllib") => {
-                let name = words.next().ok_or_else(|| wrong("the material file has no name"))?;
+                let name = rest.ok_or_else(|| wrong("the material file has no name"))?;
                 textures.extend(materials(&beside(name)?, &beside)?);
             }
-            Some("usemtl") => texture = words.next(),
+            Some("usemtl") => texture = rest,
             Some("f") => {
                 for corner in words {
                     let mut parts = corner.split('/').map(str::parse::<i64>);
@@ -125,10 +126,9 @@ fn materials(
     let mut found = Vec::new();
     let mut name = "";
     for line in text.lines() {
-        let mut words = line.split_ascii_whitespace();
-        match (words.next(), words.last()) {
-            (Some("newmtl"), Some(material)) => name = material,
-            (Some("map_Kd"), Some(file)) => found.push((name.to_owned(), Texture::decode(&beside(file)?)?)),
+        match line.trim().split_once(char::is_whitespace) {
+            Some(("newmtl", material)) => name = material.trim(),
+            Some(("map_Kd", file)) => found.push((name.to_owned(), Texture::decode(&beside(file.trim())?)?)),
             _ => {}
         }
     }

@@ -26,6 +26,7 @@ pub mod motion;
 pub mod corner_file;
 pub mod reconstruct;
 pub mod frame;
+pub mod explain;
 pub mod report;
 pub mod triangulate;
 pub mod cells;
