@@ -56,6 +56,9 @@ fn found_corners_give_the_same_model_with_any_number_of_threads() {
         command.env("RAYON_NUM_THREADS", threads).arg("synthesize").args(&pictures).arg("--cameras").args(&cameras);
         let ran = support::Ran::of(command.args(["-o", "tower.glb", "--explain"]).output()).succeeded();
         assert!(ran.stdout.contains("off the epipolar line"), "{ran:#?}");
+        // Each with its views, pixels and reason.
+        let told = ran.stdout.lines().filter(|line| line.starts_with("    1 (") && line.contains("  2 (")).count();
+        assert!(told > 10, "{ran:#?}");
         files.push(town.read("tower.glb"));
     }
     assert!(files[0] == files[1], "another number of threads, another model");
