@@ -211,9 +211,15 @@ fn the_table_is_the_same_for_any_number_of_threads_and_keeps_its_models() {
     enroll(&other, &[-20.0, 5.0], &["--jobs", "3", "--at", "52,13", "--facing", "180"]).succeeded();
     assert!(town.read("t.daymark") == other.read("t.daymark"), "another number of threads, another table");
 
-    town.run(&["table", "merge", "--out", "m.daymark", "t.daymark"]).succeeded();
+    town.run(&["table", "merge", "m.daymark", "t.daymark"]).succeeded();
     assert!(town.read("t.daymark") == town.read("m.daymark"), "copied as it was");
     town.run(&["table", "verify", "t.daymark"]).succeeded();
+    // The dense cloud is made again from what the table stores.
+    let model = ["table", "model", "t.daymark", "Bell Tower", "-o", "tower.ply", "--levels", "2", "--json"];
+    let said = town.run(&model).succeeded().json();
+    let (stored, points) = (number(&said["points_stored"]), number(&said["points"]));
+    assert!(points > 5.0 * stored && number(&said["triangles"]) > 16.0 * 0.5 * stored, "{said:#}");
+    assert!(town.read("tower.ply").starts_with(b"ply\n"));
     // Pictures of one place in the place of the others: no model any more.
     town.run(&["enroll", "--table", "t.daymark", "--name", "Bell Tower", "--no-lint", "--replace", "t1-1.pgm"])
         .succeeded();
@@ -226,7 +232,7 @@ fn numbers_that_cannot_be_are_refused() {
     let town = Town::new();
     for (options, says) in [
         (&["--facing", "400"][..], "azimuth of 400"),
-        (&["--height-m", "-3"][..], "-3 m is no height"),
+        (&["--height-m=-3"][..], "-3 m is no height"),
         (&["--facing", "10", "--facing-error", "200"][..], "uncertain by 200"),
         (&["--height-m", "3", "--distance-m", "4"][..], "cannot be used with"),
     ] {

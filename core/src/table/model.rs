@@ -92,6 +92,7 @@ pub struct ModelPoint {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct StoredModel<'a> {
     facts: ModelFacts,
+    bytes: usize,
     groups: &'a [[u8; GROUP_BYTES]],
     points: &'a [[u8; POINT_BYTES]],
     triangles: &'a [[u8; TRIANGLE_BYTES]],
@@ -183,6 +184,11 @@ impl<'a> StoredModel<'a> {
         f64::from(self.facts.deviation) * self.unit()
     }
 
+    /// Bytes of its record.
+    pub const fn bytes(&self) -> usize {
+        self.bytes
+    }
+
     /// How many points it has.
     pub const fn len(&self) -> usize {
         self.points.len()
@@ -257,6 +263,7 @@ impl<'a> StoredModel<'a> {
         };
         let model = Self {
             facts,
+            bytes: payload.len(),
             groups: groups.as_chunks().0,
             points: points.as_chunks().0,
             triangles: triangles.as_chunks().0,

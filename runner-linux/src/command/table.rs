@@ -3,6 +3,7 @@
 mod change;
 pub(super) mod facts;
 mod inspect;
+mod model;
 mod near;
 
 use std::io::{self, Write};
@@ -35,6 +36,22 @@ enum Action {
         table: PathBuf,
         /// The landmark
         name: String,
+        /// Print one JSON document instead of text
+        #[arg(long)]
+        json: bool,
+    },
+    /// Write the model of a landmark as a file, with the dense cloud made again from what the table stores
+    Model {
+        /// The table
+        table: PathBuf,
+        /// The landmark
+        name: String,
+        /// Where the model goes: .ply or .glb
+        #[arg(short, long, value_name = "FILE")]
+        output: PathBuf,
+        /// How often every triangle is divided in four
+        #[arg(long, value_name = "LEVEL", default_value_t = 3, value_parser = clap::value_parser!(u8).range(0..=7))]
+        levels: u8,
         /// Print one JSON document instead of text
         #[arg(long)]
         json: bool,
@@ -96,6 +113,7 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     match &args.action {
         Action::List { table, json } => inspect::list(table, *json),
         Action::Show { table, name, json } => inspect::show(table, name, *json),
+        Action::Model { table, name, output, levels, json } => model::model(table, name, output, *levels, *json),
         Action::Verify { table, json } => inspect::verify(table, *json),
         Action::Merge { out, tables, on_duplicate, force, json } => {
             let merge = change::Merge { out, tables, on_duplicate: *on_duplicate, force: *force };

@@ -3,7 +3,8 @@
 //!
 //! **Up** is not the mean of the cameras' up, because people tilt cameras to get a tower's top in. But they hold them level:
 //! each camera's x axis is horizontal, and so are the normals of walls. Up is the direction that is most nearly at right
-//! angles to all of these: the eigenvector of the least eigenvalue of `sum x x^T / cameras + sum n n^T (area) / area`.
+//! angles to all of these: the eigenvector of the least eigenvalue of `sum x x^T / cameras + sum w n n^T / sum w`, where a
+//! wall's weight `w` is its area as the cameras see it: what bridges a step in depth is large and seen edge-on.
 
 use nalgebra::{Matrix3, Rotation3, Vector2, Vector3};
 
@@ -43,13 +44,19 @@ pub fn upright(
     place_error: f64,
     facing: Option<[f64; 2]>,
 ) -> Option<Upright> {
-    let rough = roughly_upright(made, &scale)?;
+    // A height is measured along what is up in the end.
+    let first = if matches!(scale, Scale::Height(_)) { &Scale::None } else { &scale };
+    let rough = roughly_upright(made, first)?;
     let walls = Walls::new(made, &rough);
     let level = walls.levelling(made, &rough)?;
     let towards = walls.front(&level);
     let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), towards).into_inner() * level;
     let rotated =
         Similarity { scale: rough.scale, rotation: turn * rough.rotation, translation: turn * rough.translation };
+    let rotated = match scale {
+        Scale::Height(metres) => taller(made, &rotated, metres)?,
+        _ => rotated,
+    };
     let map = grounded(made, &rotated);
     let azimuth = facing.map(|[degrees, deviation]| [degrees + 180.0, deviation]);
     let mut upright = Upright { map, scale_error, azimuth, origin: None };
@@ -68,9 +75,10 @@ pub fn upright(
     Some(upright)
 }
 
-/// Normals of the triangles that stand upright, each as long as its triangle has area, in the rough frame.
+/// Normals of length one of the triangles that stand upright and face the cameras, in the rough frame, and their areas as the
+/// cameras see them.
 struct Walls {
-    normals: Vec<Vector3<f64>>,
+    normals: Vec<(Vector3<f64>, f64)>,
 }
 
 impl Walls {
@@ -79,7 +87,10 @@ impl Walls {
         let normals = surface.triangles.iter().filter_map(|triangle| {
             let [a, b, c] = triangle.map(|vertex| rough.apply(&surface.vertices[vertex as usize].position));
             let normal = (b - a).cross(&(c - a));
-            (normal.z.abs() <= LEVEL_SINE * normal.norm()).then_some(normal)
+            let area = normal.norm();
+            // The cameras look along +y on the whole.
+            let seen = -normal.y;
+            (seen > 0.0 && normal.z.abs() <= LEVEL_SINE * area).then(|| (normal / area, seen))
         });
         Self { normals: normals.collect() }
     }
@@ -92,9 +103,9 @@ impl Walls {
             let across = rough.rotation * station.pose.view_from_model.row(0).transpose();
             sum += across * across.transpose() / stations.len() as f64;
         }
-        let area: f64 = self.normals.iter().map(|normal| normal.norm()).sum();
-        for normal in self.normals.iter().filter(|normal| normal.norm() > 0.0) {
-            sum += normal * normal.transpose() / (normal.norm() * area);
+        let whole: f64 = self.normals.iter().map(|(_, seen)| seen).sum();
+        for (normal, seen) in &self.normals {
+            sum += normal * normal.transpose() * (seen / whole);
         }
         let eigen = sum.symmetric_eigen();
         let least = eigen.eigenvalues.imin();
@@ -115,9 +126,9 @@ impl Walls {
         let seen: Vec<(f64, f64)> = self
             .normals
             .iter()
-            .map(|normal| {
+            .map(|(normal, seen)| {
                 let normal = level * normal;
-                (libm::atan2(normal.x, -normal.y), normal.norm())
+                (libm::atan2(normal.x, -normal.y), *seen)
             })
             .collect();
         let whole: f64 = seen.iter().map(|(_, area)| area).sum();
@@ -134,6 +145,21 @@ impl Walls {
         // An outward normal at this angle from -y, counted from -y towards +x: turned back by it.
         -(angle + mean)
     }
+}
+
+/// The same map with a height of `metres` from the lowest to the highest point, but for one in a hundred.
+fn taller(made: &Reconstruction, map: &Similarity, metres: f64) -> Option<Similarity> {
+    let mut heights: Vec<f64> =
+        made.model.surface.vertices.iter().map(|vertex| map.apply(&vertex.position).z).collect();
+    heights.sort_unstable_by(f64::total_cmp);
+    let at = |share: f64| heights.get((heights.len() as f64 * share) as usize).copied().unwrap_or(0.0);
+    let factor = metres / (at(0.99) - at(0.01));
+    let Similarity { scale, rotation, translation } = map.clone();
+    (factor.is_finite() && factor > 0.0).then(|| Similarity {
+        scale: scale * factor,
+        rotation,
+        translation: translation * factor,
+    })
 }
 
 /// The same map with the origin under the middle of the points, at their lowest but for one in a hundred.

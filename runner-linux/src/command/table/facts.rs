@@ -5,7 +5,7 @@ use std::path::Path;
 use daymark_core::feature::Feature;
 use daymark_core::table::{
     CORNER_BYTES, GeoPosition, Header, LANDMARK_BYTES, LANDMARK_ENTRY_BYTES, LEVELS, Landmark, LandmarkTable,
-    StoredView, TableError, VIEW_ENTRY_BYTES, VIEW_HEADER_BYTES, encode_landmark, encode_view,
+    StoredModel, StoredView, TableError, VIEW_ENTRY_BYTES, VIEW_HEADER_BYTES, encode_landmark, encode_view,
 };
 use serde::Serialize;
 
@@ -61,12 +61,14 @@ pub(super) struct LandmarkFacts {
     pub(super) kind: &'static str,
     pub(super) position: Option<Position>,
     pub(super) views: usize,
-    /// Of its own record and its views', with their entries in the index.
+    /// Corners of its model that have a place; 0 without a model.
+    pub(super) model_points: usize,
+    /// Of its own record, its views' and its model's, with their entries in the index.
     pub(super) bytes: usize,
 }
 
 impl LandmarkFacts {
-    pub(super) fn new(landmark: &Landmark<'_>, views: &[ViewFacts]) -> Self {
+    pub(super) fn new(landmark: &Landmark<'_>, views: &[ViewFacts], model: Option<&StoredModel<'_>>) -> Self {
         let mut buffer = [0; LANDMARK_BYTES];
         let record = encode_landmark(landmark.name, landmark.kind, landmark.position, &mut buffer);
         let own = record.map_or(0, <[u8]>::len) + LANDMARK_ENTRY_BYTES;
@@ -75,7 +77,8 @@ impl LandmarkFacts {
             kind: landmark.kind.name(),
             position: landmark.position.map(position),
             views: views.len(),
-            bytes: own + views.iter().map(|view| view.bytes).sum::<usize>(),
+            model_points: model.map_or(0, StoredModel::len),
+            bytes: own + model.map_or(0, StoredModel::bytes) + views.iter().map(|view| view.bytes).sum::<usize>(),
         }
     }
 }

@@ -26,7 +26,8 @@ pub(super) fn list(path: &Path, json: bool) -> Result<(), CommandError> {
     let landmarks = (0..table.landmark_count())
         .map(|number| {
             let landmark = table.landmark(number)?;
-            Ok(LandmarkFacts::new(&landmark, &ViewFacts::all(&table, &landmark)?))
+            let model = table.model(number)?;
+            Ok(LandmarkFacts::new(&landmark, &ViewFacts::all(&table, &landmark)?, model.as_ref()))
         })
         .collect::<Result<Vec<_>, CommandError>>()?;
     let table = TableFacts::new(path, table.header());
@@ -35,10 +36,13 @@ pub(super) fn list(path: &Path, json: bool) -> Result<(), CommandError> {
         let mut text = document.table.line() + "\n";
         let names = document.landmarks.iter().map(|landmark| landmark.landmark.chars().count());
         let width = names.max().unwrap_or(0);
-        for LandmarkFacts { landmark, kind, position, views, bytes } in &document.landmarks {
+        for LandmarkFacts { landmark, kind, position, views, model_points, bytes } in &document.landmarks {
             let at = position.as_ref().map_or_else(String::new, |at| format!("  {}", place(at)));
             let (views, bytes) = (count(*views, "view"), grouped(*bytes as u64));
-            let _ = writeln!(text, "  {:width$}  {kind:10}  {views:>9}  {bytes:>9} bytes{at}", printable(landmark));
+            let model =
+                if *model_points > 0 { format!("  model of {}", count(*model_points, "point")) } else { String::new() };
+            let _ =
+                writeln!(text, "  {:width$}  {kind:10}  {views:>9}  {bytes:>9} bytes{model}{at}", printable(landmark));
         }
         text
     })
@@ -56,20 +60,25 @@ pub(super) fn show(path: &Path, name: &str, json: bool) -> Result<(), CommandErr
     let bytes = read_table(path)?;
     let table = open_table(path, &bytes)?;
     let landmarks = (0..table.landmark_count()).map(|number| table.landmark(number)).collect::<Result<Vec<_>, _>>()?;
-    let Some(landmark) = landmarks.iter().find(|landmark| landmark.name == name) else {
+    let Some((number, landmark)) = (0..).zip(&landmarks).find(|(_, landmark)| landmark.name == name) else {
         return Err(no_such_landmark(path, name, landmarks.iter().map(|landmark| landmark.name)));
     };
     let view_list = ViewFacts::all(&table, landmark)?;
-    let landmark = LandmarkFacts::new(landmark, &view_list);
+    let model = table.model(number)?;
+    let landmark = LandmarkFacts::new(landmark, &view_list, model.as_ref());
     let table = TableFacts::new(path, table.header());
     let document = Document { schema_version: SCHEMA_VERSION, table, landmark, view_list };
     print(json, &document, || {
-        let LandmarkFacts { landmark, kind, position, views, bytes } = &document.landmark;
+        let LandmarkFacts { landmark, kind, position, views, model_points, bytes } = &document.landmark;
         let (views, bytes) = (count(*views, "view"), grouped(*bytes as u64));
         let mut text = format!("{}: {kind}, {views}, {bytes} bytes\n", printable(landmark));
         let _ = match position {
             Some(at) => writeln!(text, "  stands at {}", place(at)),
             None => writeln!(text, "  position unknown; `daymark enroll --at` tells the table"),
+        };
+        let _ = match model_points {
+            0 => writeln!(text, "  no model; `daymark enroll` makes one from pictures of several places"),
+            points => writeln!(text, "  model of {}; `daymark table model` writes it", count(*points, "point")),
         };
         for ViewFacts { view, width_px, height_px, corners, corners_per_level, bytes } in &document.view_list {
             let levels = corners_per_level.map(|corners| corners.to_string()).join(" + ");
@@ -126,8 +135,9 @@ fn faults(bytes: &[u8]) -> Vec<String> {
         Err(error) => return vec![error.to_string()],
     };
     let mut faults = Vec::new();
-    for landmark in (0..table.landmark_count()).map(|number| table.landmark(number)) {
-        match landmark {
+    for number in 0..table.landmark_count() {
+        faults.extend(table.model(number).err().map(|error| error.to_string()));
+        match table.landmark(number) {
             Ok(landmark) => faults.extend(landmark.views.filter_map(|number| {
                 let error = table.view(number).err()?;
                 Some(format!("landmark {:?}: {error}", landmark.name))
