@@ -3,17 +3,12 @@
 //! Every round times each program once; printed are the least times and their ratio (peer / daymark: above 1, daymark is
 //! faster). On a busy machine only the ratios say anything.
 
-// The file itself, so that the whole command line need not be built for it.
-#[allow(dead_code, reason = "the bench times the search, and takes nothing else of the file")]
-#[path = "../../../runner-linux/src/classify/nearest.rs"]
-mod nearest;
-
 use std::hint::black_box;
 use std::time::Instant;
 
+use daymark::classify::nearest::NearestPoints;
 use daymark_core::camera::triangulate::{Pinhole, Sighting, StereoPair, triangulate};
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
-use nearest::NearestPoints;
 use spade::{DelaunayTriangulation, Point2, Triangulation};
 
 const ROUNDS: usize = 15;
@@ -115,8 +110,9 @@ fn nearest_points(count: usize, rounds: usize) {
         ours = tree.nearest_of_each(&test, &base).iter().flatten().map(|n| f64::from(n.squared)).sum();
     };
     let mut kiddo = || {
-        let tree: ImmutableKdTree<f32, 3> = ImmutableKdTree::new_from_slice(&base);
-        theirs = test.iter().map(|query| f64::from(tree.nearest_one::<SquaredEuclidean>(query).distance)).sum();
+        let tree: ImmutableKdTree<f32, 3> = ImmutableKdTree::new_from_slice(&base).expect("finite");
+        let squared = |query| tree.query(query).nearest_one::<SquaredEuclidean<f32>>().execute().distance;
+        theirs = test.iter().map(|query| f64::from(squared(query))).sum();
     };
     let [a, b] = least(rounds, [&mut own, &mut kiddo]).map(|seconds| seconds * 1e3);
     assert!((ours - theirs).abs() <= 1e-5 * theirs, "{ours} against {theirs}");

@@ -3,7 +3,9 @@
 use rayon::prelude::*;
 
 /// Points of a leaf, at most.
-const LEAF: usize = 8;
+const LEAF: usize = 16;
+/// Children of a node.
+const FOUR: usize = 4;
 /// Queries of one task.
 const CHUNK: usize = 1 << 12;
 
@@ -22,11 +24,12 @@ pub struct Nearest {
     pub squared: f32,
 }
 
-/// Lowest and highest coordinates of a node's points.
+/// Lowest and highest coordinates of the points of a node's four children, side by side: one vector instruction computes
+/// with all of them.
 #[derive(Debug, Clone, Copy)]
-struct Bounds {
-    low: [f32; 3],
-    high: [f32; 3],
+struct Node {
+    low: [[f32; FOUR]; 3],
+    high: [[f32; FOUR]; 3],
 }
 
 /// A cloud that answers which of its points is nearest.
@@ -35,15 +38,17 @@ struct Bounds {
 /// far it is, where the planes between nodes would only say how far its neighbours are.
 #[derive(Debug, Clone)]
 pub struct NearestPoints {
-    /// Node `i` has the children `2 i + 1` and `2 i + 2`; the last ones are the leaves.
-    nodes: Vec<Bounds>,
+    /// Node `i` has the children `4 i + 1` to `4 i + 4`; those beyond the last node are the leaves.
+    nodes: Vec<Node>,
     leaves: Vec<Leaf>,
 }
+
+type Entry = ([f32; 3], u32);
 
 impl NearestPoints {
     /// Builds the tree, `O(n log n)`. Points that are not finite are left out; without any there is no answer.
     pub fn new(points: &[[f32; 3]]) -> Self {
-        let mut entries: Vec<([f32; 3], u32)> = (0..)
+        let mut entries: Vec<Entry> = (0..)
             .zip(points)
             .filter(|(_, point)| point.iter().all(|c| c.is_finite()))
             .map(|(number, &point)| (point, number))
@@ -51,27 +56,21 @@ impl NearestPoints {
         if entries.is_empty() {
             return Self { nodes: Vec::new(), leaves: Vec::new() };
         }
-        let count = entries.len().div_ceil(LEAF).next_power_of_two();
+        let mut count = 1;
+        while count * LEAF < entries.len() {
+            count *= FOUR;
+        }
         let blank = Leaf { coordinates: [[f32::INFINITY; LEAF]; 3], numbers: [u32::MAX; LEAF] };
-        let nowhere = Bounds { low: [f32::INFINITY; 3], high: [f32::INFINITY; 3] };
-        let mut tree = Self { nodes: vec![nowhere; 2 * count - 1], leaves: vec![blank; count] };
-        tree.build(0, count, &mut entries);
+        let nowhere = Node { low: [[f32::INFINITY; FOUR]; 3], high: [[f32::INFINITY; FOUR]; 3] };
+        let mut tree = Self { nodes: vec![nowhere; (count - 1) / 3], leaves: vec![blank; count] };
+        let bounds = bounds(&entries);
+        tree.build(0, &mut entries, bounds);
         tree
     }
 
-    fn build(&mut self, node: usize, leaves: usize, entries: &mut [([f32; 3], u32)]) {
-        let Some(((first, _), rest)) = entries.split_first() else { return };
-        let mut bounds = Bounds { low: *first, high: *first };
-        for (point, _) in rest {
-            for ((low, high), &c) in bounds.low.iter_mut().zip(&mut bounds.high).zip(point) {
-                *low = if c < *low { c } else { *low };
-                *high = if c > *high { c } else { *high };
-            }
-        }
-        self.nodes[node] = bounds;
-        if leaves == 1 {
-            let first = self.leaves.len() - 1;
-            let leaf = &mut self.leaves[node - first];
+    fn build(&mut self, node: usize, entries: &mut [Entry], bounds: Bounds) {
+        if let Some(leaf) = node.checked_sub(self.nodes.len()) {
+            let leaf = &mut self.leaves[leaf];
             for (slot, (point, number)) in entries.iter().enumerate() {
                 for (line, &c) in leaf.coordinates.iter_mut().zip(point) {
                     line[slot] = c;
@@ -80,18 +79,20 @@ impl NearestPoints {
             }
             return;
         }
-        let extent = |axis: usize| bounds.high[axis] - bounds.low[axis];
-        let mut axis = 0;
-        for other in 1..3 {
-            if extent(other) > extent(axis) {
-                axis = other;
+        let (left, right) = halves(entries, bounds);
+        let (left_bounds, right_bounds) = (self::bounds(left), self::bounds(right));
+        let (a, b) = halves(left, left_bounds);
+        let (c, d) = halves(right, right_bounds);
+        for (child, part) in [a, b, c, d].into_iter().enumerate() {
+            let bounds = self::bounds(part);
+            for axis in 0..3 {
+                self.nodes[node].low[axis][child] = bounds.low[axis];
+                self.nodes[node].high[axis][child] = bounds.high[axis];
+            }
+            if !part.is_empty() {
+                self.build(FOUR * node + 1 + child, part, bounds);
             }
         }
-        let middle = entries.len() / 2;
-        entries.select_nth_unstable_by(middle, |a, b| a.0[axis].total_cmp(&b.0[axis]));
-        let (left, right) = entries.split_at_mut(middle);
-        self.build(2 * node + 1, leaves / 2, left);
-        self.build(2 * node + 2, leaves / 2, right);
     }
 
     /// The point nearest to `query`; `None` for an empty cloud or a query that is not finite.
@@ -109,21 +110,25 @@ impl NearestPoints {
         Some(best)
     }
 
-    /// The recursion is as deep as the tree: at most 32.
+    /// The recursion is as deep as the tree: at most 16.
     fn visit(&self, node: usize, query: [f32; 3], best: &mut Nearest) {
-        let first_leaf = self.leaves.len() - 1;
-        if node >= first_leaf {
-            self.leaves[node - first_leaf].search(query, best);
+        let Some(inner) = self.nodes.get(node) else {
+            self.leaves[node - self.nodes.len()].search(query, best);
             return;
+        };
+        let distances = inner.squared(query);
+        // The nearest child first; what it leaves of the others is seldom worth sorting.
+        let mut first = 0;
+        for child in 1..FOUR {
+            first = if distances[child] < distances[first] { child } else { first };
         }
-        let (left, right) = (2 * node + 1, 2 * node + 2);
-        let (l, r) = (self.nodes[left].squared(query), self.nodes[right].squared(query));
-        let ((near, d), (far, e)) = if l <= r { ((left, l), (right, r)) } else { ((right, r), (left, l)) };
-        if d <= best.squared {
-            self.visit(near, query, best);
-        }
-        if e <= best.squared {
-            self.visit(far, query, best);
+        if distances[first] <= best.squared {
+            self.visit(FOUR * node + 1 + first, query, best);
+            for (child, distance) in distances.into_iter().enumerate() {
+                if child != first && distance <= best.squared {
+                    self.visit(FOUR * node + 1 + child, query, best);
+                }
+            }
         }
     }
 
@@ -133,9 +138,9 @@ impl NearestPoints {
     /// space, and their part of the tree is in the cache.
     pub fn nearest_of_each(&self, queries: &[[f32; 3]], points: &[[f32; 3]]) -> Vec<Option<Nearest>> {
         let order = along_curve(queries);
-        let search = |chunk: &[(u32, u32)]| -> Vec<(u32, Option<Nearest>)> {
+        let search = |chunk: &[(u32, u32)], answer: &mut dyn FnMut(u32, Option<Nearest>)| {
             let mut before = Nearest { number: u32::MAX, squared: f32::INFINITY };
-            let search = |&(_, number): &(u32, u32)| {
+            for &(_, number) in chunk {
                 let query = queries[number as usize];
                 let start = match points.get(before.number as usize) {
                     Some(point) => Nearest { squared: squared(query, *point), ..before },
@@ -143,17 +148,25 @@ impl NearestPoints {
                 };
                 let found = self.nearest_from(query, start);
                 before = found.unwrap_or(before);
-                (number, found)
-            };
-            chunk.iter().map(search).collect()
-        };
-        // Handing work to the only other thread would cost more than it is worth.
-        let chunks: Vec<_> = if rayon::current_num_threads() == 1 {
-            order.chunks(CHUNK).map(search).collect()
-        } else {
-            order.par_chunks(CHUNK).map(search).collect()
+                answer(number, found);
+            }
         };
         let mut found = vec![None; queries.len()];
+        // Handing work to the only other thread would cost more than it is worth.
+        if rayon::current_num_threads() == 1 {
+            for chunk in order.chunks(CHUNK) {
+                search(chunk, &mut |number, nearest| found[number as usize] = nearest);
+            }
+            return found;
+        }
+        let chunks: Vec<Vec<(u32, Option<Nearest>)>> = order
+            .par_chunks(CHUNK)
+            .map(|chunk| {
+                let mut answers = Vec::with_capacity(chunk.len());
+                search(chunk, &mut |number, nearest| answers.push((number, nearest)));
+                answers
+            })
+            .collect();
         for (number, nearest) in chunks.into_iter().flatten() {
             found[number as usize] = nearest;
         }
@@ -215,17 +228,62 @@ fn squared(a: [f32; 3], b: [f32; 3]) -> f32 {
     x * x + y * y + z * z
 }
 
-impl Bounds {
-    /// Squared distance of a point: never above that of any point inside, because both are rounded alike.
-    #[inline(always)]
-    fn squared(&self, query: [f32; 3]) -> f32 {
-        let off = |axis: usize| {
-            let (below, above) = (self.low[axis] - query[axis], query[axis] - self.high[axis]);
-            let off = if below > above { below } else { above };
-            if off > 0.0 { off } else { 0.0 }
+/// Lowest and highest coordinates.
+#[derive(Debug, Clone, Copy)]
+struct Bounds {
+    low: [f32; 3],
+    high: [f32; 3],
+}
+
+/// Those of points; of none they are at infinity.
+fn bounds(entries: &[Entry]) -> Bounds {
+    let Some(((first, _), rest)) = entries.split_first() else {
+        return Bounds { low: [f32::INFINITY; 3], high: [f32::INFINITY; 3] };
+    };
+    let mut bounds = Bounds { low: *first, high: *first };
+    for (point, _) in rest {
+        for ((low, high), &c) in bounds.low.iter_mut().zip(&mut bounds.high).zip(point) {
+            *low = if c < *low { c } else { *low };
+            *high = if c > *high { c } else { *high };
+        }
+    }
+    bounds
+}
+
+/// The halves of points along their longest extent.
+fn halves(entries: &mut [Entry], bounds: Bounds) -> (&mut [Entry], &mut [Entry]) {
+    let extent = |axis: usize| bounds.high[axis] - bounds.low[axis];
+    let mut axis = 0;
+    for other in 1..3 {
+        if extent(other) > extent(axis) {
+            axis = other;
+        }
+    }
+    let middle = entries.len() / 2;
+    if entries.len() > 1 {
+        match axis {
+            0 => entries.select_nth_unstable_by(middle, |a, b| a.0[0].total_cmp(&b.0[0])),
+            1 => entries.select_nth_unstable_by(middle, |a, b| a.0[1].total_cmp(&b.0[1])),
+            _ => entries.select_nth_unstable_by(middle, |a, b| a.0[2].total_cmp(&b.0[2])),
         };
-        let (x, y, z) = (off(0), off(1), off(2));
-        x * x + y * y + z * z
+    }
+    entries.split_at_mut(middle)
+}
+
+impl Node {
+    /// Squared distances of a point from the four: never above that of any point inside, because both are rounded alike.
+    #[inline(always)]
+    fn squared(&self, query: [f32; 3]) -> [f32; FOUR] {
+        let mut sums = [0.0; FOUR];
+        for axis in 0..3 {
+            for child in 0..FOUR {
+                let (below, above) = (self.low[axis][child] - query[axis], query[axis] - self.high[axis][child]);
+                let off = if below > above { below } else { above };
+                let off = if off > 0.0 { off } else { 0.0 };
+                sums[child] += off * off;
+            }
+        }
+        sums
     }
 }
 
@@ -238,14 +296,26 @@ impl Leaf {
             let (x, y, z) = (query[0] - xs[slot], query[1] - ys[slot], query[2] - zs[slot]);
             squares[slot] = x * x + y * y + z * z;
         }
-        let least = squares.iter().fold(f32::INFINITY, |least, &square| if square < least { square } else { least });
+        // Four lanes at a time, then across.
+        let mut lanes = [f32::INFINITY; FOUR];
+        for four in squares.as_chunks::<FOUR>().0 {
+            for (lane, &square) in lanes.iter_mut().zip(four) {
+                *lane = if square < *lane { square } else { *lane };
+            }
+        }
+        let [a, b, c, d] = lanes;
+        let (a, b) = (if a < b { a } else { b }, if c < d { c } else { d });
+        let least = if a < b { a } else { b };
         if least > best.squared {
             return;
         }
-        for (&squared, &number) in squares.iter().zip(&self.numbers) {
-            if squared < best.squared || (squared == best.squared && number < best.number) {
-                *best = Nearest { number, squared };
-            }
+        // Of equally near ones the least number.
+        let number = squares.iter().zip(&self.numbers).fold(u32::MAX, |first, (&square, &number)| {
+            let number = if square == least { number } else { u32::MAX };
+            if number < first { number } else { first }
+        });
+        if least < best.squared || number < best.number {
+            *best = Nearest { number, squared: least };
         }
     }
 }
@@ -265,7 +335,7 @@ mod tests {
 
     #[test]
     fn it_is_the_nearest_of_all_and_the_first_of_equals() {
-        for count in [1, 2, 7, 8, 9, 100, 1_000] {
+        for count in [1, 2, 15, 16, 17, 63, 64, 65, 1_000] {
             let points = cloud(count, 5);
             let tree = NearestPoints::new(&points);
             let queries = cloud(500, 77);

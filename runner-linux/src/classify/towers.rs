@@ -145,6 +145,50 @@ impl TowerViews {
     }
 }
 
+/// The true surface of a tower: the faces of its solids, in the model frame.
+#[derive(Debug, Clone)]
+pub struct TrueSurface {
+    /// Outlines, counter-clockwise seen from outside, and normals of length one.
+    faces: Vec<(Vec<Vector3<f64>>, Vector3<f64>)>,
+}
+
+impl TrueSurface {
+    /// The surface of a tower at the origin. Faces inside of other solids are part of it: nothing that is seen is near them.
+    pub fn new(tower: &Tower) -> Self {
+        let vector = |point: daymark_fixtures::Vec3| Vector3::new(point.x, point.y, point.z);
+        let faces = tower.solids.iter().flat_map(daymark_fixtures::solid::Solid::faces).map(|face| {
+            let normal = vector(daymark_fixtures::solid::normal(&face.outline));
+            (face.outline.into_iter().map(vector).collect(), normal)
+        });
+        Self { faces: faces.collect() }
+    }
+
+    /// Distance of a point from the nearest face, metres.
+    pub fn distance(&self, point: &Vector3<f64>) -> f64 {
+        let squared = |(outline, normal): &(Vec<Vector3<f64>>, Vector3<f64>)| {
+            let edges = || outline.iter().zip(outline.iter().cycle().skip(1));
+            let inside = edges().all(|(a, b)| (b - a).cross(&(point - a)).dot(normal) >= 0.0);
+            if inside {
+                let off = outline.first().map_or(f64::INFINITY, |corner| (point - corner).dot(normal));
+                return off * off;
+            }
+            edges().fold(f64::INFINITY, |least, (a, b)| {
+                let edge = b - a;
+                let along = ((point - a).dot(&edge) / edge.norm_squared()).clamp(0.0, 1.0);
+                least.min((a + edge * along - point).norm_squared())
+            })
+        };
+        libm::sqrt(self.faces.iter().map(squared).fold(f64::INFINITY, f64::min))
+    }
+
+    /// The median and the 95th percentile of the distances of points; NaN without any.
+    pub fn distances(&self, points: impl Iterator<Item = Vector3<f64>>) -> [f64; 2] {
+        let mut distances: Vec<f64> = points.map(|point| self.distance(&point)).collect();
+        distances.sort_unstable_by(f64::total_cmp);
+        [0.5, 0.95].map(|share| distances.get((distances.len() as f64 * share) as usize).copied().unwrap_or(f64::NAN))
+    }
+}
+
 /// Normal numbers from a seed: the sum of twelve uniform ones, which needs no function that differs between machines.
 #[derive(Debug)]
 pub struct Gauss(SplitMix64);
@@ -178,5 +222,23 @@ mod tests {
         let mean = numbers.iter().sum::<f64>() / 20_000.0;
         let variance = numbers.iter().map(|x| x * x).sum::<f64>() / 20_000.0;
         assert!(mean.abs() < 0.03 && (variance - 1.0).abs() < 0.04, "{mean} {variance}");
+    }
+
+    #[test]
+    fn the_true_surface_of_a_prism_is_as_far_as_it_looks() {
+        // The Bell Tower stands on a rectangle; its corners lie on the surface.
+        let tower = &Tower::eight()[0];
+        let surface = TrueSurface::new(tower);
+        for corner in tower.corners() {
+            let off = surface.distance(&Vector3::new(corner.model.x, corner.model.y, corner.model.z));
+            assert!(off < 1e-9, "{corner:?} {off}");
+        }
+        let above = Vector3::new(0.0, 0.0, tower.height() + 3.0);
+        assert!((surface.distance(&above) - 3.0).abs() < 1e-9);
+        let before = Vector3::new(0.0, -100.0, 1.0);
+        let front = tower.solids.iter().flat_map(|solid| &solid.bottom).map(|(_, y)| *y).fold(0.0, f64::min);
+        assert!((surface.distance(&before) - (100.0 + front)).abs() < 0.5, "{front}");
+        let line = (0..100).map(|i| above + Vector3::new(0.0, 0.0, f64::from(i)));
+        assert_eq!(surface.distances(line).map(|d| libm::round(d) as i32), [53, 98]);
     }
 }

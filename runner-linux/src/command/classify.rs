@@ -12,7 +12,7 @@ use crate::classify::cloud::Cloud;
 use crate::classify::decide::{Answer, Intensity, Refusal, Rule};
 use crate::classify::experiment::{Method, Row, compare_with_each, size};
 use crate::classify::histogram::{Histogram, coloured};
-use crate::model_file::ply;
+use crate::model_file::{self, Format};
 use crate::table_file::replace_file;
 
 /// Version of the form of `--json`.
@@ -22,10 +22,10 @@ const SCHEMA_VERSION: u32 = 1;
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Exit codes: 0 every test is one of the bases, 1 some test is none of them, 2 an error.")]
 pub struct Args {
-    /// Models to classify: .ply files, as `daymark synthesize` writes them
+    /// Models to classify: .ply, .glb or .obj files, as `daymark synthesize` writes them
     #[arg(required = true, value_name = "TESTS")]
     tests: Vec<PathBuf>,
-    /// The folder with the known models: each .ply file is one, its name is the building's
+    /// The folder with the known models: each .ply, .glb or .obj file is one, its name is the building's
     #[arg(long, value_name = "DIR")]
     bases: PathBuf,
     /// How the clouds come together
@@ -92,7 +92,7 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
         let row = Row::new(path.display().to_string(), size(&test), &comparisons, &method);
         let nearest = row.decision.nearest.and_then(|base| comparisons.get(base));
         if let (Some(folder), Some(nearest)) = (&args.coloured, nearest) {
-            let file = folder.join(path.file_name().unwrap_or(path.as_os_str()));
+            let file = folder.join(path.file_name().unwrap_or(path.as_os_str())).with_extension("ply");
             replace_file(&file, &coloured(&test.positions, &nearest.distances))
                 .map_err(|error| format!("cannot write {}: {error}", file.display()))?;
         }
@@ -112,8 +112,7 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
 }
 
 fn read_cloud(path: &Path) -> Result<Cloud, CommandError> {
-    let bytes = std::fs::read(path).map_err(|error| format!("cannot read the model {}: {error}", path.display()))?;
-    let points = ply::read(&bytes).map_err(|what| format!("cannot use the model {}: {what}", path.display()))?;
+    let points = model_file::read(path).map_err(|what| format!("cannot use the model {}: {what}", path.display()))?;
     let squares: f64 = points.deviations.iter().map(|&d| f64::from(d) * f64::from(d)).sum();
     let deviation = libm::sqrt(squares / points.positions.len().max(1) as f64);
     Ok(Cloud::new(points.positions, points.gray, deviation))
@@ -123,12 +122,14 @@ fn read_bases(folder: &Path) -> Result<(Vec<String>, Vec<Cloud>), CommandError> 
     let entries =
         std::fs::read_dir(folder).map_err(|error| format!("cannot read the folder {}: {error}", folder.display()))?;
     let mut paths: Vec<PathBuf> = entries.filter_map(|entry| Some(entry.ok()?.path())).collect();
-    paths.retain(|path| path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("ply")));
+    paths.retain(|path| Format::of_path(path).is_ok());
     paths.sort();
     if paths.is_empty() {
-        return Err(
-            format!("{} has no .ply files: write models there with `daymark synthesize -o`", folder.display()).into()
-        );
+        return Err(format!(
+            "{} has no models (.ply, .glb, .obj): write some there with `daymark synthesize -o`",
+            folder.display()
+        )
+        .into());
     }
     let name = |path: &PathBuf| path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let clouds = paths.iter().map(|path| read_cloud(path)).collect::<Result<_, _>>()?;

@@ -74,7 +74,7 @@ pub struct Args {
     /// Write the report as a page with pictures
     #[arg(long, value_name = "FILE.html")]
     report: Option<PathBuf>,
-    /// Tell why matches, points and triangles were left out, pair by pair
+    /// Tell why matches, points and triangles were left out: counts for each pair, and matches one by one (with --json, too)
     #[arg(long)]
     explain: bool,
     /// Print one JSON document instead of text
@@ -127,7 +127,8 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     let unit = place(args, &mut made)?;
     progress.step("subdividing");
     let dense = made.model.dense(level, &made.views, &made.stations)?;
-    let facts = facts(&made, &dense, unit);
+    let mut facts = facts(&made, &dense, unit);
+    facts.explained = args.explain.then(|| std::mem::take(&mut made.explained));
     progress.step("writing");
     output::write(&args.output, format, args.texture, &made, &dense, &facts)?;
     if let Some(path) = &args.preview {

@@ -5,6 +5,7 @@
 
 use serde_json::{Value, json};
 
+use super::points::{Points, Texture, gray_of};
 use super::sheet::Sheet;
 use crate::synthesize::dense::DenseCloud;
 
@@ -160,6 +161,124 @@ fn file(mut document: Value, binary: &[u8]) -> Vec<u8> {
     bytes
 }
 
+/// Reads the points of a binary glTF file, as this program writes it: meshes without transforms, with a texture or colours
+/// at their points, everything in the file's own buffer.
+///
+/// # Errors
+/// What is wrong with the file, or beyond that.
+pub fn read(bytes: &[u8]) -> Result<Points, String> {
+    let file = Read::new(bytes)?;
+    let moved = |node: &Value| ["matrix", "translation", "rotation", "scale"].iter().any(|key| node.get(key).is_some());
+    if list(&file.document["nodes"]).any(moved) {
+        return Err("its nodes have transforms, which are not read here: apply them first".to_owned());
+    }
+    let mut points = Points::default();
+    for primitive in list(&file.document["meshes"]).flat_map(|mesh| list(&mesh["primitives"])) {
+        let attributes = &primitive["attributes"];
+        let positions = file.accessor(&attributes["POSITION"], FLOAT, "VEC3")?;
+        let gray = file.gray_levels(primitive, positions.len() / 12)?;
+        let number = |bytes: &[u8]| bytes.first_chunk::<4>().map_or(f32::NAN, |bytes| f32::from_le_bytes(*bytes));
+        for (position, gray) in positions.chunks_exact(12).zip(gray) {
+            let [x, y, z] = [0, 4, 8].map(|at| position.get(at..).map_or(f32::NAN, number));
+            points.positions.push([x, -z, y]);
+            points.gray.push(gray);
+            points.deviations.push(0.0);
+        }
+    }
+    let points = points.joined();
+    if points.positions.is_empty() { Err("it has no points".to_owned()) } else { Ok(points) }
+}
+
+fn list(value: &Value) -> impl Iterator<Item = &Value> {
+    value.as_array().into_iter().flatten()
+}
+
+/// A file while it is read.
+struct Read<'b> {
+    document: Value,
+    binary: &'b [u8],
+}
+
+impl<'b> Read<'b> {
+    fn new(bytes: &'b [u8]) -> Result<Self, String> {
+        let rest = bytes.strip_prefix(b"glTF").ok_or("it is no binary glTF file")?;
+        let word = |at: usize| Some(u32::from_le_bytes(*rest.get(at..)?.first_chunk::<4>()?) as usize);
+        if word(0) != Some(2) {
+            return Err("it is no glTF of version 2".to_owned());
+        }
+        let chunk = |at: usize| -> Option<(&'b [u8], usize)> {
+            let (length, begin) = (word(at)?, at + 8);
+            Some((rest.get(begin..begin.checked_add(length)?)?, begin + length))
+        };
+        let (text, next) = chunk(8).ok_or("it ends too early")?;
+        let document = serde_json::from_slice(text).map_err(|error| format!("its JSON: {error}"))?;
+        let binary = if rest.len() > next { chunk(next).ok_or("it ends too early")?.0 } else { &[] };
+        Ok(Self { document, binary })
+    }
+
+    fn view(&self, number: &Value) -> Result<&'b [u8], String> {
+        let view = number.as_u64().and_then(|number| self.document["bufferViews"].get(number as usize));
+        let view = view.ok_or("a part of its buffer is not described")?;
+        let place = |key: &str| view[key].as_u64().unwrap_or(0) as usize;
+        if place("buffer") != 0 || place("byteStride") != 0 {
+            return Err("its points are in other files or between other values, which is not read here".to_owned());
+        }
+        let (begin, length) = (place("byteOffset"), place("byteLength"));
+        begin
+            .checked_add(length)
+            .and_then(|end| self.binary.get(begin..end))
+            .ok_or_else(|| "it ends too early".to_owned())
+    }
+
+    /// The bytes of an accessor of this kind.
+    fn accessor(&self, number: &Value, component: u32, kind: &str) -> Result<&'b [u8], String> {
+        let accessor = number.as_u64().and_then(|number| self.document["accessors"].get(number as usize));
+        let accessor = accessor.ok_or("its points are not described")?;
+        if accessor["componentType"] != component || accessor["type"] != kind || accessor.get("sparse").is_some() {
+            return Err(format!("its values are not {kind} of the type {component}"));
+        }
+        let size = if component == FLOAT { 4 } else { 2 };
+        let parts = match kind {
+            "VEC2" => 2,
+            "VEC3" => 3,
+            _ => 4,
+        };
+        let begin = accessor["byteOffset"].as_u64().unwrap_or(0) as usize;
+        let length = (accessor["count"].as_u64().unwrap_or(0) as usize).saturating_mul(size * parts);
+        let view = self.view(&accessor["bufferView"])?;
+        view.get(begin..)
+            .and_then(|rest| rest.get(..length))
+            .ok_or_else(|| "it has more points than bytes for them".to_owned())
+    }
+
+    /// The gray levels of a primitive's points: of its texture or its colours, NaN without either.
+    fn gray_levels(&self, primitive: &Value, count: usize) -> Result<Vec<f32>, String> {
+        let attributes = &primitive["attributes"];
+        if attributes.get("COLOR_0").is_some() {
+            let colours = self.accessor(&attributes["COLOR_0"], UNSIGNED_SHORT, "VEC4")?;
+            let channel = |bytes: &[u8]| bytes.first_chunk::<2>().map_or(0, |bytes| u16::from_le_bytes(*bytes));
+            let gray = |colour: &[u8]| gray_of([0, 2, 4].map(|at| level(colour.get(at..).map_or(0, channel)))) as f32;
+            return Ok(colours.chunks_exact(8).map(gray).collect());
+        }
+        let material = primitive["material"].as_u64().and_then(|at| self.document["materials"].get(at as usize));
+        let texture = material.map(|material| &material["pbrMetallicRoughness"]["baseColorTexture"]["index"]);
+        let Some(texture) = texture.and_then(Value::as_u64) else { return Ok(vec![f32::NAN; count]) };
+        let source = &self.document["textures"][texture as usize]["source"];
+        let image = source.as_u64().map(|at| &self.document["images"][at as usize]["bufferView"]);
+        let texture = Texture::decode(self.view(image.unwrap_or(&Value::Null))?)?;
+        let uv = self.accessor(&attributes["TEXCOORD_0"], FLOAT, "VEC2")?;
+        let number = |bytes: &[u8]| bytes.first_chunk::<4>().map_or(f32::NAN, |bytes| f32::from_le_bytes(*bytes));
+        let gray = |uv: &[u8]| texture.gray_at([0, 4].map(|at| uv.get(at..).map_or(f32::NAN, number)));
+        Ok(uv.chunks_exact(8).map(gray).collect())
+    }
+}
+
+/// Linear light, 0 to 65,535, as an sRGB level, 0 to 1: the inverse of [`linear`].
+fn level(light: u16) -> f64 {
+    let c = f64::from(light) / 65_535.0;
+    if c <= 0.003_130_8 { c * 12.92 } else { 1.055 * libm::pow(c, 1.0 / 2.4) - 0.055 }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -174,5 +293,45 @@ mod tests {
     #[test]
     fn the_front_faces_plus_z() {
         assert_eq!(y_up([1.0, -2.0, 3.0]), [1.0, 3.0, 2.0]);
+    }
+
+    fn cloud() -> DenseCloud {
+        DenseCloud {
+            level: daymark_core::mesh::SubdivisionLevel::ZERO,
+            positions: vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.5], [0.0, 2.0, 0.0], [1.0, 2.0, 0.0]],
+            deviations: vec![0.1; 4],
+            gray: vec![0.0; 4],
+            rgb: vec![[30, 30, 30], [60, 60, 60], [90, 90, 90], [150, 150, 150]],
+            triangles: vec![[0, 1, 2], [1, 3, 2]],
+        }
+    }
+
+    #[test]
+    fn what_is_written_is_read() {
+        let points = read(&patches(&cloud(), &Value::Null)).unwrap();
+        assert_eq!(points.positions, cloud().positions);
+        // The triangles are 60 and 100 of 255; points of both are in between.
+        for (gray, level) in points.gray.iter().zip([60.0, 80.0, 80.0, 100.0]) {
+            assert!((gray * 255.0 - level).abs() < 0.1, "{gray} {level}");
+        }
+        let mut jpeg = Vec::new();
+        let picture = image::GrayImage::from_fn(32, 32, |x, _| image::Luma([if x < 16 { 64 } else { 192 }]));
+        picture.write_to(&mut std::io::Cursor::new(&mut jpeg), image::ImageFormat::Jpeg).unwrap();
+        let sheet = Sheet {
+            view: Some(0),
+            points: vec![0, 1, 2, 3],
+            uv: vec![[0.1, 0.5], [0.9, 0.5], [0.1, 0.9], [0.9, 0.1]],
+            triangles: cloud().triangles,
+            jpeg,
+        };
+        let file = textured(&cloud(), &[sheet], &Value::Null);
+        let points = read(&file).unwrap();
+        assert_eq!(points.positions, cloud().positions);
+        for (gray, level) in points.gray.iter().zip([64.0, 192.0, 64.0, 192.0]) {
+            assert!((gray * 255.0 - level).abs() < 4.0, "{gray} {level}");
+        }
+        for cut in (0..file.len() - 4).step_by(7) {
+            assert!(read(&file[..cut]).is_err(), "{cut}");
+        }
     }
 }

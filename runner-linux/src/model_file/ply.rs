@@ -3,6 +3,7 @@
 
 use std::fmt::Write as _;
 
+use super::points::{Points, gray_of};
 use crate::synthesize::dense::DenseCloud;
 
 /// The file; each of `comments` is one line of its header.
@@ -34,17 +35,6 @@ pub fn file(cloud: &DenseCloud, comments: &[String]) -> Vec<u8> {
         bytes.extend(rgb);
     }
     bytes
-}
-
-/// What of a PLY file is compared: points, their gray levels and deviations, and which of them a face has.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Points {
-    /// Positions.
-    pub positions: Vec<[f32; 3]>,
-    /// Gray levels 0 to 1 of points with a colour; NaN for others.
-    pub gray: Vec<f32>,
-    /// Standard deviations; 0 where the file has none.
-    pub deviations: Vec<f32>,
 }
 
 /// Points of a file, at most.
@@ -87,10 +77,7 @@ pub fn read(bytes: &[u8]) -> Result<Points, String> {
                 let [Some(x), Some(y), Some(z)] = xyz else { return Err("its points have no x, y and z".to_owned()) };
                 points.positions.push([values[x] as f32, values[y] as f32, values[z] as f32]);
                 points.gray.push(match rgb {
-                    // Rec. 601, as pictures are read.
-                    [Some(r), Some(g), Some(b)] => {
-                        ((0.299 * values[r] + 0.587 * values[g] + 0.114 * values[b]) / 255.0) as f32
-                    }
+                    [Some(r), Some(g), Some(b)] => (gray_of([values[r], values[g], values[b]]) / 255.0) as f32,
                     _ => f32::NAN,
                 });
                 points.deviations.push(deviation.map_or(0.0, |at| values[at] as f32));

@@ -4,6 +4,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::epipolar::{Estimate, Pair, RelativePose, relative_pose};
+use super::explain::{Explained, LeftOut, Reason};
 use super::factorize::affine_inliers;
 use super::features::{ViewFeatures, guided_matches, mutual_matches};
 use super::view::{Station, Track, View};
@@ -31,6 +32,8 @@ pub struct PairMatches {
     pub matches: Vec<[u32; 2]>,
     /// The relative pose; `None` if the views do not share enough.
     pub estimate: Option<Estimate>,
+    /// Look-alikes that were removed, and why.
+    pub left_out: Vec<([u32; 2], Reason)>,
 }
 
 impl PairMatches {
@@ -81,8 +84,10 @@ fn matched([a, b]: [usize; 2], views: &[View], features: &[ViewFeatures], geomet
     };
     let directions: Vec<Pair> = alike.iter().map(|&pair| direction(pair)).collect();
     let threshold = 2.0 * INLIER_PX / (left.focal[0] + right.focal[0]);
-    let none =
-        |agreeing| PairMatches { views: [a, b], alike: alike.len(), agreeing, matches: Vec::new(), estimate: None };
+    let none = |agreeing| {
+        let left_out = alike.iter().map(|&pair| (pair, Reason::PairWithoutGeometry)).collect();
+        PairMatches { views: [a, b], alike: alike.len(), agreeing, matches: Vec::new(), estimate: None, left_out }
+    };
     let seed = (a * 65_536 + b) as u64;
     let estimate = match geometry {
         Geometry::Known(stations) => match (stations[a], stations[b]) {
@@ -98,23 +103,35 @@ fn matched([a, b]: [usize; 2], views: &[View], features: &[ViewFeatures], geomet
                 return none(inliers.len());
             }
             let matches: Vec<[u32; 2]> = inliers.iter().map(|&number| alike[number]).collect();
-            return PairMatches { views: [a, b], alike: alike.len(), agreeing: matches.len(), matches, estimate: None };
+            let left_out = others(alike.len(), &inliers)
+                .map(|number| (alike[number], Reason::OffEpipolarLine { distance_px: None }))
+                .collect();
+            let (alike, agreeing) = (alike.len(), inliers.len());
+            return PairMatches { views: [a, b], alike, agreeing, matches, estimate: None, left_out };
         }
     };
     let agreeing = estimate.as_ref().map_or(0, |estimate| estimate.inliers.len());
     let enough = agreeing >= MIN_INLIERS && agreeing as f64 >= MIN_JOINING_SHARE * alike.len() as f64;
     let Some(mut estimate) = estimate.filter(|_| enough) else { return none(agreeing) };
     let mut matches: Vec<[u32; 2]> = estimate.inliers.iter().map(|&number| alike[number]).collect();
+    let left_out = others(alike.len(), &estimate.inliers)
+        .map(|number| {
+            let off = libm::sqrt(estimate.pose.squared_distance(&directions[number]));
+            let distance_px = Some(off * INLIER_PX / threshold);
+            (
+                alike[number],
+                if off < threshold { Reason::BehindCamera } else { Reason::OffEpipolarLine { distance_px } },
+            )
+        })
+        .collect();
     // With the geometry known, look-alikes that were not clear before may be now.
     let limit = threshold * threshold;
-    let near = |from: [f64; 2], to: [f64; 2]| {
-        if !(from[0].is_finite() && to[0].is_finite()) {
-            return false;
-        }
-        let pair = [left.normalized_from_ideal(from), right.normalized_from_ideal(to)];
-        estimate.pose.squared_distance(&pair) < limit
-    };
-    for pair in guided_matches(one, other, &matches, near) {
+    let lines = estimate.pose.lines(
+        one.ideal.iter().map(|&at| left.normalized_from_ideal(at)),
+        other.ideal.iter().map(|&at| right.normalized_from_ideal(at)),
+    );
+    // What has no direction is NaN, and not below.
+    for pair in guided_matches(one, other, &matches, |a, b| lines.squared_distance(a, b) < limit) {
         if estimate.pose.depths(&direction(pair)).is_some_and(|[a, b]| a > 0.0 && b > 0.0) {
             matches.push(pair);
         }
@@ -123,7 +140,12 @@ fn matched([a, b]: [usize; 2], views: &[View], features: &[ViewFeatures], geomet
     if matches!(geometry, Geometry::Lenses) {
         estimate.pose = estimate.pose.refined(&refined.iter(), threshold / 2.0, 10);
     }
-    PairMatches { views: [a, b], alike: alike.len(), agreeing, matches, estimate: Some(estimate) }
+    PairMatches { views: [a, b], alike: alike.len(), agreeing, matches, estimate: Some(estimate), left_out }
+}
+
+/// The numbers below `count` that are not among these ascending ones.
+fn others(count: usize, numbers: &[usize]) -> impl Iterator<Item = usize> + '_ {
+    (0..count).filter(|number| numbers.binary_search(number).is_err())
 }
 
 /// The same with a geometry that is known.
@@ -145,8 +167,16 @@ fn known(one: &Station, other: &Station, directions: &[Pair], threshold: f64) ->
 }
 
 /// Joins matches to tracks: one feature a view and track; the others are wrong somewhere and go.
-pub fn tracks(features: &[ViewFeatures], pairs: &[PairMatches]) -> (Vec<Track>, RemovedMatches) {
+pub fn tracks(features: &[ViewFeatures], pairs: &[PairMatches]) -> (Vec<Track>, RemovedMatches, Explained) {
     let mut removed = RemovedMatches::default();
+    let mut explained = Explained::default();
+    for pair in pairs {
+        let [a, b] = pair.views;
+        let told = pair.left_out.iter().map(|&([i, j], reason)| {
+            LeftOut::new(&[(a, features[a].ideal[i as usize]), (b, features[b].ideal[j as usize])], reason)
+        });
+        explained.extend(pair.left_out.len(), told);
+    }
     let mut first = vec![0_usize];
     for view in features {
         first.push(first[first.len() - 1] + view.points.len());
@@ -173,15 +203,18 @@ pub fn tracks(features: &[ViewFeatures], pairs: &[PairMatches]) -> (Vec<Track>, 
         }
     }
     let mut tracks = Vec::new();
+    let mut contradicting = Vec::new();
     for sightings in groups.into_values().filter(|sightings| sightings.len() > 1) {
         // Ascending by view, because nodes are.
         if sightings.windows(2).any(|two| two[0].0 == two[1].0) {
-            removed.contradicting_tracks += 1;
+            contradicting.push(LeftOut::new(&sightings, Reason::Contradiction));
         } else {
             tracks.push(Track { number: tracks.len() as u32 + 1, sightings });
         }
     }
-    (tracks, removed)
+    removed.contradicting_tracks = contradicting.len();
+    explained.extend(contradicting.len(), contradicting.into_iter());
+    (tracks, removed, explained)
 }
 
 fn root(parent: &mut [usize], mut node: usize) -> usize {

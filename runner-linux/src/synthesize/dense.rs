@@ -121,45 +121,41 @@ pub fn dense(
             triangle_of_vertex[vertex as usize].get_or_insert(number);
         }
     }
-    let steps = f64::from(level.steps());
+    let share = 1.0 / f64::from(level.steps());
     let variances: Vec<f64> = surface.vertices.iter().map(|vertex| vertex.covariance.trace()).collect();
     let mut deviations = Vec::with_capacity(positions.len());
+    // The view of each point; `u32::MAX` where no view shows its triangle.
     let mut views_of_points = Vec::with_capacity(positions.len());
-    for point in fine.points() {
+    fine.points().for_each(|point| {
         let parts = point.corners.iter().zip(point.weights);
         let variance: f64 = parts
             .map(|(&corner, weight)| {
-                let share = f64::from(weight) / steps;
+                let share = f64::from(weight) * share;
                 share * share * variances[usize::from(corner)]
             })
             .sum();
         deviations.push(libm::sqrt(variance) as f32);
-        let triangle = point.triangle.or(triangle_of_vertex[usize::from(point.corners[0])]);
-        views_of_points.push(triangle.and_then(|triangle| shown.get(triangle as usize).copied().flatten()));
-    }
-    let coloured: Vec<(f32, [u8; 3])> = positions
-        .par_chunks(CHUNK)
-        .zip(views_of_points.par_chunks(CHUNK))
-        .flat_map_iter(|(positions, shown)| {
-            positions.iter().zip(shown).map(|(position, view)| {
-                view.and_then(|view| {
-                    colour(views.get(view as usize)?, stations.get(view as usize)?.as_ref()?, position)
-                })
-                .unwrap_or((f32::NAN, [128; 3]))
-            })
-        })
-        .collect();
-    let (gray, rgb) = coloured.into_iter().unzip();
+        let triangle = point.triangle.or_else(|| triangle_of_vertex[usize::from(point.corners[0])]);
+        let view = triangle.and_then(|triangle| shown.get(triangle as usize).copied().flatten());
+        views_of_points.push(view.unwrap_or(u32::MAX));
+    });
+    let mut gray = vec![f32::NAN; positions.len()];
+    let mut rgb = vec![[128; 3]; positions.len()];
+    let of_points = positions.par_chunks(CHUNK).zip(views_of_points.par_chunks(CHUNK));
+    of_points.zip(gray.par_chunks_mut(CHUNK).zip(rgb.par_chunks_mut(CHUNK))).for_each(|(points, colours)| {
+        let colours = colours.0.iter_mut().zip(colours.1);
+        for ((position, view), (gray, rgb)) in points.0.iter().zip(points.1).zip(colours) {
+            let number = *view as usize;
+            let (Some(view), Some(Some(station))) = (views.get(number), stations.get(number)) else { continue };
+            if let Some(at) = station.pinhole.project(position.map(f64::from)) {
+                let at = view.lens.picture_from_ideal(at);
+                // What a point stands for is more than a pixel's middle.
+                *gray = view.mean_gray_at(at) / 255.0;
+                *rgb = view.colour_at(at).map(|channel| (channel + 0.5) as u8);
+            }
+        }
+    });
     Ok(DenseCloud { level, positions, deviations, gray, rgb, triangles })
-}
-
-fn colour(view: &View, station: &Station, position: &[f32; 3]) -> Option<(f32, [u8; 3])> {
-    let at = view.lens.picture_from_ideal(station.pinhole.project(position.map(f64::from))?);
-    let rgb = view.colour_at(at).map(|channel| (channel + 0.5) as u8);
-    // The mean of a square of 2 px: what a point stands for is more than a pixel's middle.
-    let offsets = [[-0.5, -0.5], [0.5, -0.5], [-0.5, 0.5], [0.5, 0.5]];
-    let sum: f64 = offsets.iter().map(|[dx, dy]| view.gray_at([at[0] + dx, at[1] + dy])).sum();
-    Some(((sum / (4.0 * 255.0)) as f32, rgb))
 }
 
 impl DenseCloud {

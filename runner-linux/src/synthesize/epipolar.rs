@@ -53,6 +53,24 @@ impl RelativePose {
         squared_distance(&self.essential(), pair)
     }
 
+    /// The epipolar lines of many directions of both views, for pairs among them.
+    pub fn lines(
+        &self,
+        first: impl Iterator<Item = [f64; 2]>,
+        second: impl Iterator<Item = [f64; 2]>,
+    ) -> EpipolarLines {
+        let essential = self.essential();
+        EpipolarLines {
+            of_first: first.map(|at| essential * homogeneous(at)).collect(),
+            of_second: second
+                .map(|at| {
+                    let line = essential.tr_mul(&homogeneous(at));
+                    (at, line.x * line.x, line.y * line.y)
+                })
+                .collect(),
+        }
+    }
+
     /// Depths of a pair's point along the optical axes of the two views, for `|t| = 1`; `None` for parallel rays.
     pub fn depths(&self, [a, b]: &Pair) -> Option<[f64; 2]> {
         let (x, y) = (self.rotation * homogeneous(*a), homogeneous(*b));
@@ -145,6 +163,26 @@ impl RelativePose {
     }
 }
 
+/// What is computed once for each direction of two views.
+#[derive(Debug, Clone)]
+pub struct EpipolarLines {
+    /// Lines in the second view.
+    of_first: Vec<Vector3<f64>>,
+    /// Directions of the second view, and the squares of their lines' coefficients in the first.
+    of_second: Vec<([f64; 2], f64, f64)>,
+}
+
+impl EpipolarLines {
+    /// The squared Sampson distance of a pair, by its numbers; NaN for a direction that is none.
+    #[inline]
+    pub fn squared_distance(&self, first: usize, second: usize) -> f64 {
+        let (p, ([x, y], qx, qy)) = (&self.of_first[first], &self.of_second[second]);
+        let n = x * p.x + y * p.y + p.z;
+        let length = p.x * p.x + p.y * p.y + qx + qy;
+        n * n / length
+    }
+}
+
 fn homogeneous([x, y]: [f64; 2]) -> Vector3<f64> {
     Vector3::new(x, y, 1.0)
 }
@@ -168,9 +206,20 @@ pub fn relative_pose(pairs: &[Pair], threshold: f64, seed: u64) -> Option<Estima
         return None;
     }
     let limit = threshold * threshold;
-    let cost = |pose: &RelativePose| {
+    // Sums only grow: what is above the best is left early.
+    let cost = |pose: &RelativePose, enough: f64| {
         let essential = pose.essential();
-        pairs.iter().map(|pair| squared_distance(&essential, pair).min(limit)).sum::<f64>()
+        let mut sum = 0.0;
+        for part in pairs.chunks(32) {
+            sum = part.iter().fold(sum, |sum, pair| {
+                let squared = squared_distance(&essential, pair);
+                sum + if squared < limit { squared } else { limit }
+            });
+            if sum >= enough {
+                break;
+            }
+        }
+        sum
     };
     let inliers_of = |pose: &RelativePose| -> Vec<usize> {
         let essential = pose.essential();
@@ -204,16 +253,18 @@ pub fn relative_pose(pairs: &[Pair], threshold: f64, seed: u64) -> Option<Estima
             if five().any(|pair| !(pose.squared_distance(pair) < 1e-4 * limit)) {
                 continue;
             }
-            let now = cost(&pose);
-            if best.is_some_and(|best| now >= best.1) {
+            let least = best.map_or(f64::INFINITY, |best| best.1);
+            let now = cost(&pose, least);
+            if now >= least {
                 continue;
             }
             best = Some((pose, now));
             for _ in 0..3 {
                 let inliers = inliers_of(&pose);
                 let refined = pose.refined(&inliers.iter().map(|&number| &pairs[number]), threshold, 6);
-                let lower = cost(&refined);
-                if best.is_some_and(|best| lower >= best.1) {
+                let least = best.map_or(f64::INFINITY, |best| best.1);
+                let lower = cost(&refined, least);
+                if lower >= least {
                     break;
                 }
                 (pose, best) = (refined, Some((refined, lower)));
@@ -284,20 +335,25 @@ fn plane_share(pairs: &[&Pair], threshold: f64, seed: u64) -> f64 {
     }
     let limit = threshold * threshold;
     let mut random = SplitMix64::new(seed ^ 0x5bd1_e995);
-    let agreeing = |map: &Matrix3<f64>| -> Vec<&Pair> {
-        let near = |pair: &&&Pair| {
-            let to = map * homogeneous(pair[0]);
-            let (dx, dy) = (to.x / to.z - pair[1][0], to.y / to.z - pair[1][1]);
-            dx * dx + dy * dy < limit
-        };
-        pairs.iter().filter(near).copied().collect()
+    let near = |map: &Matrix3<f64>, pair: &Pair| {
+        let to = map * homogeneous(pair[0]);
+        let (dx, dy) = (to.x / to.z - pair[1][0], to.y / to.z - pair[1][1]);
+        dx * dx + dy * dy < limit
     };
+    let agreeing =
+        |map: &Matrix3<f64>| -> Vec<&Pair> { pairs.iter().copied().filter(|pair| near(map, pair)).collect() };
     let mut most: Vec<&Pair> = Vec::new();
     for _ in 0..200 {
         let four = [(); 4].map(|()| pairs[random.range(0, pairs.len() as i32) as usize]);
-        let Some(found) = homography(&four).map(|map| agreeing(&map)) else { continue };
-        if found.len() > most.len() {
-            most = found;
+        let Some(map) = homography(&four) else { continue };
+        // A map that cannot have the most any more is left early.
+        let (mut off, bearable) = (0, pairs.len() - most.len());
+        let more = pairs.chunks(32).all(|part| {
+            off += part.iter().filter(|pair| !near(&map, pair)).count();
+            off < bearable
+        });
+        if more {
+            most = agreeing(&map);
         }
     }
     // Four noisy points do not carry a map far: least squares over those that agree does.

@@ -22,7 +22,7 @@ const RATIO_PERCENT: u32 = 85;
 /// Along a line there are fewer to be mistaken for.
 const GUIDED_RATIO_PERCENT: u32 = 80;
 /// A line holds dozens of features, and one of them is always on it: signatures must be nearer than elsewhere.
-const MAX_GUIDED_BITS: u32 = 28;
+const MAX_GUIDED_BITS: u8 = 28;
 /// Bits at which a rival is looked at.
 const MAX_RIVAL_BITS: u8 = 48;
 /// What lies this near is the same place, no competitor; pixels.
@@ -66,33 +66,44 @@ pub fn features(view: &View) -> Result<ViewFeatures, FrameError> {
 /// Pairs of features whose signatures are nearest to one another in both directions, clearly nearer than the next ones
 /// elsewhere. Ties have no match. `O(n m)`.
 pub fn mutual_matches(first: &ViewFeatures, second: &ViewFeatures) -> Vec<[u32; 2]> {
-    let mut row = vec![0; first.points.len().max(second.points.len())];
-    (0..first.points.len())
-        .filter_map(|number| {
-            let best = nearest(first.signatures[number], second, &mut row)?;
-            // The way back is looked for only where there is one.
-            let back = nearest(second.signatures[best], first, &mut row)?;
-            (back == number).then_some([number as u32, best as u32])
-        })
-        .collect()
+    with_kernels!(Processor::detect(), kernels => {
+        let mut row = Row::new(first.points.len().max(second.points.len()));
+        (0..first.points.len())
+            .filter_map(|number| {
+                let best = row.nearest(kernels, first.signatures[number], second)?;
+                // The way back is looked for only where there is one.
+                let back = row.nearest(kernels, second.signatures[best], first)?;
+                (back == number).then_some([number as u32, best as u32])
+            })
+            .collect()
+    })
 }
 
-/// The feature nearest to a signature, if it is near and no other one elsewhere comes close.
-fn nearest(signature: Signature, to: &ViewFeatures, row: &mut [u8]) -> Option<usize> {
-    let row = row.get_mut(..to.signatures.len())?;
-    with_kernels!(Processor::detect(), kernels => {
+/// Distances of one signature from many, and room to look for the near ones.
+struct Row {
+    distances: Vec<u8>,
+    marks: Vec<u64>,
+}
+
+impl Row {
+    fn new(length: usize) -> Self {
+        Self { distances: vec![0; length], marks: vec![0; length.div_ceil(64)] }
+    }
+
+    /// The feature nearest to a signature, if it is near and no other one elsewhere comes close.
+    fn nearest(&mut self, kernels: &impl Kernels, signature: Signature, to: &ViewFeatures) -> Option<usize> {
+        let row = self.distances.get_mut(..to.signatures.len())?;
+        let marks = self.marks.get_mut(..row.len().div_ceil(64))?;
         kernels.distances(signature, &to.signatures, row);
         let least = row.iter().copied().min()?;
         if u32::from(least) > MAX_BITS {
             return None;
         }
-        let best = row.iter().position(|&distance| distance == least)?;
-        let limit = (u32::from(least) * 100 / RATIO_PERCENT) as u8;
-        let mut marks = vec![0; row.len().div_ceil(64)];
-        kernels.marks_at_most(row, limit, &mut marks);
-        let rival = places(&marks).any(|other| elsewhere(to.points[other], to.points[best]));
+        kernels.marks_at_most(row, (u32::from(least) * 100 / RATIO_PERCENT) as u8, marks);
+        let best = places(marks).find(|&place| row[place] == least)?;
+        let rival = places(marks).any(|other| elsewhere(to.points[other], to.points[best]));
         (!rival).then_some(best)
-    })
+    }
 }
 
 fn elsewhere(a: [f64; 2], b: [f64; 2]) -> bool {
@@ -100,36 +111,41 @@ fn elsewhere(a: [f64; 2], b: [f64; 2]) -> bool {
 }
 
 /// For features without a match: the nearest signature among those that `near` allows, if no other comes close.
+///
+/// `near` is asked with the numbers of two features, and only about look-alikes.
 pub fn guided_matches(
     first: &ViewFeatures,
     second: &ViewFeatures,
     known: &[[u32; 2]],
-    near: impl Fn([f64; 2], [f64; 2]) -> bool,
+    near: impl Fn(usize, usize) -> bool,
 ) -> Vec<[u32; 2]> {
     let (mut left, mut right) = (vec![false; first.points.len()], vec![false; second.points.len()]);
     for &[a, b] in known {
         (left[a as usize], right[b as usize]) = (true, true);
     }
+    // What is left of the second view, side by side.
+    let rest: Vec<usize> = (0..right.len()).filter(|&b| !right[b]).collect();
+    let signatures: Vec<Signature> = rest.iter().map(|&b| second.signatures[b]).collect();
     let mut found: Vec<(u8, [u32; 2])> = Vec::new();
-    let mut row = vec![0; second.points.len()];
-    let mut marks = vec![0; row.len().div_ceil(64)];
-    for (a, signature) in first.signatures.iter().enumerate().filter(|(a, _)| !left[*a]) {
-        let mut candidates: Vec<(u8, usize)> = Vec::new();
-        with_kernels!(Processor::detect(), kernels => {
-            kernels.distances(*signature, &second.signatures, &mut row);
-            kernels.marks_at_most(&row, MAX_RIVAL_BITS, &mut marks);
-            let allowed = places(&marks).filter(|&b| !right[b] && near(first.ideal[a], second.ideal[b]));
-            candidates.extend(allowed.map(|b| (row[b], b)));
-        });
-        candidates.sort_unstable();
-        let Some(&(least, best)) = candidates.first().filter(|(least, _)| u32::from(*least) <= MAX_GUIDED_BITS) else {
-            continue;
-        };
-        let next = candidates.iter().find(|(_, other)| elsewhere(second.points[*other], second.points[best]));
-        if next.is_none_or(|(next, _)| u32::from(least) * 100 <= u32::from(*next) * GUIDED_RATIO_PERCENT) {
-            found.push((least, [a as u32, best as u32]));
+    with_kernels!(Processor::detect(), kernels => {
+        let Row { mut distances, mut marks } = Row::new(rest.len());
+        for (a, signature) in first.signatures.iter().enumerate().filter(|(a, _)| !left[*a]) {
+            kernels.distances(*signature, &signatures, &mut distances);
+            // Most have nothing that is near enough: their rivals need not be looked at.
+            kernels.marks_at_most(&distances, MAX_GUIDED_BITS, &mut marks);
+            let allowed = places(&marks).filter(|&place| near(a, rest[place]));
+            let Some((least, best)) = allowed.map(|place| (distances[place], rest[place])).min() else { continue };
+            kernels.marks_at_most(&distances, MAX_RIVAL_BITS, &mut marks);
+            let rivals = places(&marks).filter(|&place| {
+                u32::from(least) * 100 > u32::from(distances[place]) * GUIDED_RATIO_PERCENT
+                    && elsewhere(second.points[rest[place]], second.points[best])
+            });
+            let mut rivals = rivals.map(|place| rest[place]);
+            if !rivals.any(|rival| near(a, rival)) {
+                found.push((least, [a as u32, best as u32]));
+            }
         }
-    }
+    });
     // One to one, the best first.
     found.sort_unstable();
     found

@@ -13,6 +13,7 @@ use serde::Serialize;
 use spade::handles::FixedVertexHandle;
 use spade::{DelaunayTriangulation, HasPosition, Point2, Triangulation};
 
+use super::cells::{Cells, bounds};
 use super::view::{Station, Surface, Vertex};
 
 /// What was dropped, and why.
@@ -95,8 +96,12 @@ pub fn surface(
     pairs: &[[usize; 2]],
     spacing_px: f64,
 ) -> (Surface, Dropped) {
+    let sights: Vec<Option<Sights>> = (0..stations.len())
+        .into_par_iter()
+        .map(|view| Some(Sights::new(view, stations[view].as_ref()?, &vertices)))
+        .collect();
     let candidates: Vec<(Vec<[u32; 3]>, Dropped)> =
-        pairs.par_iter().map(|&pair| pair_triangles(&vertices, stations, pair, spacing_px)).collect();
+        pairs.par_iter().map(|&pair| pair_triangles(&vertices, stations, &sights, pair, spacing_px)).collect();
     let mut dropped = Dropped::default();
     let mut triangles: Vec<[u32; 3]> = Vec::new();
     // Directed edges: each belongs to one triangle, so that the surface is one that core's mesh accepts.
@@ -112,7 +117,7 @@ pub fn surface(
         for triangle in found {
             let [a, b, c] = triangle;
             let around = [[a, b], [b, c], [c, a]];
-            if covering.covers(&vertices, triangle, station) {
+            if covering.covers(triangle) {
                 dropped.covered += 1;
             } else if around.iter().any(|edge| edges.contains(edge)) || known.contains(&sorted(triangle)) {
                 dropped.crossing += 1;
@@ -134,6 +139,7 @@ fn sorted(mut triangle: [u32; 3]) -> [u32; 3] {
 fn pair_triangles(
     vertices: &[Vertex],
     stations: &[Option<Station>],
+    sights: &[Option<Sights>],
     [first, second]: [usize; 2],
     spacing_px: f64,
 ) -> (Vec<[u32; 3]>, Dropped) {
@@ -163,7 +169,7 @@ fn pair_triangles(
         let places = corners.map(|vertex| vertices[vertex as usize].position);
         if [one, other].iter().all(|station| sine_of_sight(&places, &station.pose.position) < GRAZING_SINE) {
             dropped.grazing += 1;
-        } else if hides_a_point(vertices, stations, corners, &places) {
+        } else if sights.iter().flatten().any(|sights| sights.has_hidden(vertices, corners, &places)) {
             dropped.hiding += 1;
         } else {
             // With y down, positive is clockwise as seen: turned, it is counter-clockwise from outside.
@@ -216,19 +222,37 @@ fn sine_of_sight(places: &[Vector3<f64>; 3], eye: &Vector3<f64>) -> f64 {
     if length > 0.0 { normal.dot(&sight).abs() / length } else { 0.0 }
 }
 
-/// Whether some view sees a point through this triangle.
-fn hides_a_point(
-    vertices: &[Vertex],
-    stations: &[Option<Station>],
-    corners: [u32; 3],
-    places: &[Vector3<f64>; 3],
-) -> bool {
-    let normal = (places[1] - places[0]).cross(&(places[2] - places[0]));
-    (0_u32..).zip(vertices).filter(|(number, _)| !corners.contains(number)).any(|(_, vertex)| {
-        let deviation = libm::sqrt(vertex.covariance.trace().max(0.0));
-        vertex.track.sightings.iter().any(|&(view, _)| {
-            let Some(Some(station)) = stations.get(view) else { return false };
-            let eye = station.pose.position;
+/// What one view sees: its points' images by cells, so that a triangle is compared with what it may hide only.
+struct Sights {
+    station: Station,
+    cells: Cells,
+    /// For each vertex a bound of how far it is from where it seems to be.
+    deviations: Vec<f64>,
+}
+
+impl Sights {
+    fn new(view: usize, station: &Station, vertices: &[Vertex]) -> Self {
+        let images: Vec<(u32, [[f64; 2]; 2])> = (0_u32..)
+            .zip(vertices)
+            .filter(|(_, vertex)| vertex.track.seen_by(view).is_some())
+            .filter_map(|(number, vertex)| {
+                let at = station.pinhole.project(vertex.position.into())?;
+                Some((number, [at, at]))
+            })
+            .collect();
+        let deviations = vertices.iter().map(|vertex| libm::sqrt(vertex.covariance.trace().max(0.0))).collect();
+        Self { station: *station, cells: Cells::new(&images), deviations }
+    }
+
+    /// Whether the view sees a point through this triangle.
+    fn has_hidden(&self, vertices: &[Vertex], corners: [u32; 3], places: &[Vector3<f64>; 3]) -> bool {
+        let eye = self.station.pose.position;
+        let normal = (places[1] - places[0]).cross(&(places[2] - places[0]));
+        let hides = |number: u32| {
+            if corners.contains(&number) {
+                return false;
+            }
+            let (vertex, deviation) = (&vertices[number as usize], self.deviations[number as usize]);
             let sight = vertex.position - eye;
             let slope = normal.dot(&sight);
             if slope == 0.0 {
@@ -242,8 +266,14 @@ fn hides_a_point(
             let met = eye + sight * way;
             // Well inside: away from the edges by a hundredth of the triangle.
             barycentric(places, &normal, &met).iter().all(|&weight| weight > 0.01)
-        })
-    })
+        };
+        let images = places.map(|place| self.station.pinhole.project(place.into()));
+        match images {
+            // In front of the camera the image of a triangle is a triangle: only what lies in it can be hidden by it.
+            [Some(a), Some(b), Some(c)] => self.cells.within(bounds([a, b, c])).any(hides),
+            _ => self.cells.all().any(hides),
+        }
+    }
 }
 
 fn barycentric(places: &[Vector3<f64>; 3], normal: &Vector3<f64>, at: &Vector3<f64>) -> [f64; 3] {
@@ -254,32 +284,39 @@ fn barycentric(places: &[Vector3<f64>; 3], normal: &Vector3<f64>, at: &Vector3<f
 
 /// What lies in one view's picture already.
 struct Covering {
-    /// Triangles that face the view: pixels and depths of their corners.
+    /// Pixels and depth of each vertex that lies in front.
+    images: Vec<Option<[f64; 3]>>,
+    /// Triangles that face the view.
     facing: Vec<[[f64; 3]; 3]>,
+    cells: Cells,
 }
 
 impl Covering {
     fn new(vertices: &[Vertex], triangles: &[[u32; 3]], station: &Station) -> Self {
-        let facing = triangles
+        let images: Vec<Option<[f64; 3]>> = vertices.iter().map(|vertex| image(vertex, station)).collect();
+        let facing: Vec<[[f64; 3]; 3]> = triangles
             .iter()
             .filter_map(|triangle| {
-                let corners = triangle.map(|vertex| image(vertices, vertex, station));
+                let corners = triangle.map(|vertex| images[vertex as usize]);
                 let [Some(a), Some(b), Some(c)] = corners else { return None };
                 // Counter-clockwise from outside is negative with y down.
                 let facing = area([[a[0], a[1]], [b[0], b[1]], [c[0], c[1]]]) < 0.0;
                 facing.then_some([a, b, c])
             })
             .collect();
-        Self { facing }
+        let rectangles: Vec<_> =
+            (0..).zip(&facing).map(|(number, corners)| (number, bounds(corners.map(|[x, y, _]| [x, y])))).collect();
+        Self { images, cells: Cells::new(&rectangles), facing }
     }
 
     /// Whether a triangle's middle lies on another one at about the same depth, or behind one.
-    fn covers(&self, vertices: &[Vertex], triangle: [u32; 3], station: &Station) -> bool {
-        let [Some(a), Some(b), Some(c)] = triangle.map(|vertex| image(vertices, vertex, station)) else { return true };
+    fn covers(&self, triangle: [u32; 3]) -> bool {
+        let [Some(a), Some(b), Some(c)] = triangle.map(|vertex| self.images[vertex as usize]) else { return true };
         // In perspective depth is linear in its inverse.
         let middle = [0, 1].map(|axis| (a[axis] + b[axis] + c[axis]) / 3.0);
         let depth = 3.0 / (1.0 / a[2] + 1.0 / b[2] + 1.0 / c[2]);
-        self.facing.iter().any(|[p, q, r]| {
+        self.cells.within([middle; 2]).any(|number| {
+            let [p, q, r] = &self.facing[number as usize];
             let whole = area([[p[0], p[1]], [q[0], q[1]], [r[0], r[1]]]);
             let weight = |s: &[f64; 3], t: &[f64; 3]| area([[s[0], s[1]], [t[0], t[1]], middle]) / whole;
             let (u, v, w) = (weight(q, r), weight(r, p), weight(p, q));
@@ -293,8 +330,8 @@ impl Covering {
     }
 }
 
-fn image(vertices: &[Vertex], vertex: u32, station: &Station) -> Option<[f64; 3]> {
-    let position: [f64; 3] = vertices.get(vertex as usize)?.position.into();
+fn image(vertex: &Vertex, station: &Station) -> Option<[f64; 3]> {
+    let position: [f64; 3] = vertex.position.into();
     let [x, y] = station.pinhole.project(position)?;
     Some([x, y, station.pinhole.depth(position)])
 }

@@ -3,6 +3,7 @@
 use daymark_core::mesh::SubdivisionLevel;
 
 use super::dense::{DenseCloud, DenseError, dense};
+use super::explain::Reason;
 use super::mesh::{Dropped, surface};
 use super::texture::best_views;
 use super::triangulate::{Refusals, Rules, points};
@@ -17,6 +18,8 @@ pub struct Model {
     pub shown: Vec<Option<u32>>,
     /// Tracks that gave no point.
     pub refused: Refusals,
+    /// The same one by one: places in the list of tracks.
+    pub refused_tracks: Vec<(usize, Reason)>,
     /// Triangles that were dropped.
     pub dropped: Dropped,
 }
@@ -33,10 +36,10 @@ impl Model {
         rules: &Rules,
         spacing_px: f64,
     ) -> Self {
-        let (vertices, refused) = points(tracks, stations, rules);
+        let (vertices, refused_tracks) = points(tracks, stations, rules);
         let (surface, dropped) = surface(vertices, stations, pairs, spacing_px);
         let shown = best_views(&surface, views, stations);
-        Self { surface, shown, refused, dropped }
+        Self { surface, shown, refused: Refusals::count(&refused_tracks), refused_tracks, dropped }
     }
 
     /// Its dense cloud at a level.

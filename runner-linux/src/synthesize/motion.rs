@@ -6,7 +6,7 @@ use daymark_core::camera::triangulate::{Sighting, triangulate};
 use nalgebra::{Matrix3, Vector3};
 use serde::Serialize;
 
-use super::bundle::{Bundle, Common, Free, Observation};
+use super::bundle::{Adjusted, Bundle, Common, Free, Observation};
 use super::correspond::{MIN_INLIERS, MIN_SHARE, PairMatches};
 use super::view::{Station, Track, View};
 use crate::camera_file::distortion::Distortion;
@@ -80,6 +80,11 @@ const OUTLIER_PX: f64 = 4.0;
 /// The same in the end.
 const FINAL_OUTLIER_PX: f64 = 2.5;
 
+/// An adjustment that is followed by another one ends with a step that lowers the cost by a smaller share.
+const ROUGH: f64 = 1e-4;
+/// The same for the last.
+const FINE: f64 = 1e-7;
+
 /// What was found.
 #[derive(Debug, Clone)]
 pub struct Motion {
@@ -146,23 +151,24 @@ pub fn motion(views: &[View], pairs: &[PairMatches], tracks: &[Track], free_lens
     growth.poses[first.views[1]] = Some(pose);
     growth.order = first.views.to_vec();
     growth.triangulate();
-    growth.adjust(Free::Motion, 15);
+    growth.adjust(Free::Motion, 15, ROUGH);
     while let Some(view) = growth.next_view() {
         if !growth.join(view) {
             growth.given_up[view] = true;
             continue;
         }
         growth.triangulate();
-        growth.adjust(Free::Motion, 8);
+        growth.adjust(Free::Motion, 8, ROUGH);
         growth.remove_outliers(OUTLIER_PX);
     }
     let free = if free_lens && growth.order.len() > 2 { Free::MotionAndLens } else { Free::Motion };
-    let mut result = growth.adjust(free, 30);
-    for limit in [OUTLIER_PX, FINAL_OUTLIER_PX, FINAL_OUTLIER_PX] {
+    growth.adjust(free, 30, ROUGH);
+    let mut result = Adjusted::default();
+    for (limit, least_gain) in [(OUTLIER_PX, ROUGH), (FINAL_OUTLIER_PX, ROUGH), (FINAL_OUTLIER_PX, FINE)] {
         growth.remove_outliers(limit);
         growth.triangulate();
         growth.remove_outliers(limit);
-        result = growth.adjust(free, 30);
+        result = growth.adjust(free, 30, least_gain);
     }
     Ok(growth.finish(first.views, result))
 }
@@ -257,9 +263,9 @@ impl<'a> Growth<'a> {
         (bundle, numbers)
     }
 
-    fn adjust(&mut self, free: Free, steps: usize) -> super::bundle::Adjusted {
+    fn adjust(&mut self, free: Free, steps: usize, least_gain: f64) -> Adjusted {
         let (mut bundle, numbers) = self.bundle();
-        let adjusted = bundle.adjust(free, steps);
+        let adjusted = bundle.adjust(free, steps, least_gain);
         for (&view, pose) in self.order.iter().zip(&bundle.poses) {
             self.poses[view] = Some(*pose);
         }
@@ -330,7 +336,7 @@ impl<'a> Growth<'a> {
         let Some((agreeing, pose)) = best.filter(|best| best.0 >= 10) else { return false };
         self.poses[view] = Some(pose);
         self.order.push(view);
-        self.adjust(Free::Camera(self.order.len() - 1), 40);
+        self.adjust(Free::Camera(self.order.len() - 1), 40, ROUGH);
         let now = self.poses[view].map_or(0, |pose| self.agreeing(view, &pose, OUTLIER_PX));
         if now < 10 || now * 3 < agreeing {
             self.poses[view] = None;
@@ -380,7 +386,7 @@ impl<'a> Growth<'a> {
         self.tracks.iter().zip(&self.points).filter(|(track, point)| near(track, point)).count()
     }
 
-    fn finish(self, first_pair: [usize; 2], adjusted: super::bundle::Adjusted) -> Motion {
+    fn finish(self, first_pair: [usize; 2], adjusted: Adjusted) -> Motion {
         let lenses: Vec<Lens> = self
             .views
             .iter()

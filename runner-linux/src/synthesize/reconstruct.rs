@@ -1,12 +1,13 @@
 //! The whole way: pictures and what is known of their cameras become a model.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
 use serde::Serialize;
 
 use super::correspond::{self, Geometry, PairMatches, RemovedMatches};
 use super::epipolar::relative_pose;
+use super::explain::{Explained, LeftOut, Reason};
 use super::factorize::{NoShape, factorize};
 use super::features::{ViewFeatures, features};
 use super::model::Model;
@@ -56,6 +57,8 @@ pub struct Reconstruction {
     pub tracks: usize,
     /// What lengths and angles mean.
     pub shape: Shape,
+    /// Matches and tracks that were left out, one by one.
+    pub explained: Explained,
 }
 
 /// What lengths and angles of a model mean.
@@ -156,7 +159,7 @@ pub fn reconstruct(
         (None, Cameras::Affine) => Geometry::Affine,
         (None, _) => Geometry::Lenses,
     };
-    let (matches, tracks, removed) = correspondences(&views, geometry, corners)?;
+    let (matches, tracks, removed, mut explained) = correspondences(&views, geometry, corners)?;
     let facts = matches
         .iter()
         .map(|pair| PairFacts {
@@ -170,9 +173,10 @@ pub fn reconstruct(
         .collect();
     let mut shape = Shape::UpToScale;
     let mut rules = *rules;
+    let all = tracks;
     let (views, stations, tracks) = match (cameras, stations) {
         (Cameras::Affine, _) => {
-            let found = factorize(&tracks, views.len()).map_err(NoModel::Shape)?;
+            let found = factorize(&all, views.len()).map_err(NoModel::Shape)?;
             shape = if found.metric { Shape::UpToMirror } else { Shape::Affine };
             // Angles mean nothing yet, and perspective is an error here.
             rules.max_reprojection_px = rules.max_reprojection_px.max(3.0 * found.rms_px);
@@ -182,7 +186,7 @@ pub fn reconstruct(
             (views, found.stations, found.tracks)
         }
         (Cameras::Unknown { free_lens }, _) => {
-            let found = motion(&views, &matches, &tracks, *free_lens).map_err(NoModel::Motion)?;
+            let found = motion(&views, &matches, &all, *free_lens).map_err(NoModel::Motion)?;
             let views = views.into_iter().zip(found.lenses).map(|(view, lens)| View { lens, ..view }).collect();
             (views, found.stations, found.tracks)
         }
@@ -194,22 +198,27 @@ pub fn reconstruct(
             {
                 return Err(NoModel::OtherCameras { alike: best.alike, agreeing: best.agreeing });
             }
-            (views, stations.unwrap_or_default(), tracks)
+            (views, stations.unwrap_or_default(), all.clone())
         }
     };
+    let kept: BTreeSet<u32> = tracks.iter().map(|track| track.number).collect();
+    let lost = || all.iter().filter(|track| !kept.contains(&track.number));
+    explained.extend(lost().count(), lost().map(|track| LeftOut::new(&track.sightings, Reason::NotAdjusted)));
     let order = mesh_pairs(&tracks, views.len());
     let spacing = if matches!(corners, Corners::Automatic) { AUTOMATIC_SPACING_PX } else { 0.0 };
     let model = Model::new(&views, &stations, &tracks, &order, &rules, spacing);
     if model.surface.triangles.is_empty() {
         return Err(NoModel::TooFewPoints { points: model.surface.vertices.len(), refused: model.refused });
     }
-    Ok(Reconstruction { views, stations, model, pairs: facts, removed, tracks: tracks.len(), shape })
+    let refused = model.refused_tracks.iter().map(|&(number, why)| LeftOut::new(&tracks[number].sightings, why));
+    explained.extend(model.refused_tracks.len(), refused);
+    Ok(Reconstruction { views, stations, model, pairs: facts, removed, tracks: tracks.len(), shape, explained })
 }
 
 /// Automatic corners closer than this do not both carry the surface, pixels: their noise would fold it.
 const AUTOMATIC_SPACING_PX: f64 = 7.0;
 
-type Found = (Vec<PairMatches>, Vec<Track>, RemovedMatches);
+type Found = (Vec<PairMatches>, Vec<Track>, RemovedMatches, Explained);
 
 fn correspondences(views: &[View], geometry: Geometry<'_>, corners: &Corners) -> Result<Found, NoModel> {
     match corners {
@@ -219,8 +228,8 @@ fn correspondences(views: &[View], geometry: Geometry<'_>, corners: &Corners) ->
                 .map(|view| features(view).map_err(|error| NoModel::Picture(format!("{}: {error}", view.name))))
                 .collect::<Result<_, _>>()?;
             let pairs = correspond::pairs(views, &found, geometry);
-            let (tracks, removed) = correspond::tracks(&found, &pairs);
-            Ok((pairs, tracks, removed))
+            let (tracks, removed, explained) = correspond::tracks(&found, &pairs);
+            Ok((pairs, tracks, removed, explained))
         }
         Corners::Picked(corners) => {
             let mut tracks: BTreeMap<u32, Track> = BTreeMap::new();
@@ -235,7 +244,7 @@ fn correspondences(views: &[View], geometry: Geometry<'_>, corners: &Corners) ->
             }
             let tracks: Vec<Track> = tracks.into_values().filter(|track| track.sightings.len() > 1).collect();
             let pairs = picked_pairs(views, &tracks, !matches!(geometry, Geometry::Lenses));
-            Ok((pairs, tracks, RemovedMatches::default()))
+            Ok((pairs, tracks, RemovedMatches::default(), Explained::default()))
         }
     }
 }
@@ -258,7 +267,7 @@ fn picked_pairs(views: &[View], tracks: &[Track], known: bool) -> Vec<PairMatche
             let estimate = if known { None } else { relative_pose(&directions, threshold, (a * 65_536 + b) as u64) };
             let matches = shared.iter().map(|(number, _)| [*number; 2]).collect();
             let agreeing = estimate.as_ref().map_or(shared.len(), |estimate| estimate.inliers.len());
-            PairMatches { views: [a, b], alike: shared.len(), agreeing, matches, estimate }
+            PairMatches { views: [a, b], alike: shared.len(), agreeing, matches, estimate, left_out: Vec::new() }
         })
         .collect()
 }

@@ -57,22 +57,36 @@ impl DepthBuffer {
             let high = a[axis].max(b[axis]).max(c[axis]).min(length as f64 - 1.0);
             if high < low { 0..0 } else { libm::ceil(low) as usize..libm::floor(high) as usize + 1 }
         };
+        // Weights are linear in x and y, and so is the inverse of the depth.
+        let weight = |p: [f64; 3], q: [f64; 3]| {
+            let (dx, dy) = ((p[1] - q[1]) / area, (q[0] - p[0]) / area);
+            (dx, dy, -(dx * p[0] + dy * p[1]))
+        };
+        let (u, v) = (weight(b, c), weight(c, a));
+        let inverse = [a, b, c].map(|corner| 1.0 / corner[2]);
+        let columns = range(0, self.width);
         for y in range(1, self.height) {
-            for x in range(0, self.width) {
-                let (px, py) = (x as f64, y as f64);
-                let weight =
-                    |p: [f64; 3], q: [f64; 3]| ((q[0] - p[0]) * (py - p[1]) - (q[1] - p[1]) * (px - p[0])) / area;
-                let (u, v) = (weight(b, c), weight(c, a));
+            let row = y as f64;
+            let (u0, v0) = (u.1 * row + u.2, v.1 * row + v.2);
+            let line = y * self.width;
+            let (Some(depths), Some(numbers)) = (
+                self.depths.get_mut(line + columns.start..line + columns.end),
+                self.triangles.get_mut(line + columns.start..line + columns.end),
+            ) else {
+                continue;
+            };
+            for ((x, kept), triangle) in (columns.start as u32..).zip(depths).zip(numbers) {
+                let x = f64::from(x);
+                let (u, v) = (u.0 * x + u0, v.0 * x + v0);
                 let w = 1.0 - u - v;
-                if u < 0.0 || v < 0.0 || w < 0.0 {
+                if (u < 0.0) | (v < 0.0) | (w < 0.0) {
                     continue;
                 }
-                let depth = (1.0 / (u / a[2] + v / b[2] + w / c[2])) as f32;
-                let at = y * self.width + x;
+                let depth = (1.0 / (u * inverse[0] + v * inverse[1] + w * inverse[2])) as f32;
                 // The first of equals stays.
-                if depth < self.depths[at] {
-                    self.depths[at] = depth;
-                    self.triangles[at] = number;
+                if depth < *kept {
+                    *kept = depth;
+                    *triangle = number;
                 }
             }
         }

@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use super::correspond::RemovedMatches;
 use super::dense::DenseCloud;
+use super::explain::Explained;
 use super::mesh::Dropped;
 use super::reconstruct::{PairFacts, Reconstruction, Shape};
 use super::triangulate::Refusals;
@@ -56,6 +57,9 @@ pub struct Facts {
     pub dropped_triangles: Dropped,
     /// Triangles that no view shows.
     pub unseen_triangles: usize,
+    /// Matches and tracks that were left out, one by one, if that was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub explained: Option<Explained>,
 }
 
 /// What one view gave.
@@ -152,6 +156,7 @@ pub fn facts(made: &Reconstruction, dense: &DenseCloud, length_unit: &'static st
         refused_points: made.model.refused,
         dropped_triangles: made.model.dropped,
         unseen_triangles: made.model.shown.iter().filter(|shown| shown.is_none()).count(),
+        explained: None,
     }
 }
 

@@ -5,6 +5,7 @@ use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 use serde::Serialize;
 
+use super::explain::Reason;
 use super::view::{Station, Track, Vertex};
 
 /// When a point is refused.
@@ -38,49 +39,58 @@ pub struct Refusals {
 }
 
 impl Refusals {
+    /// Counts reasons.
+    pub fn count(reasons: &[(usize, Reason)]) -> Self {
+        let mut refused = Self::default();
+        for (_, reason) in reasons {
+            match reason {
+                Reason::SmallParallax { .. } => refused.small_parallax += 1,
+                Reason::BehindCamera => refused.behind_camera += 1,
+                Reason::LargeError { .. } => refused.large_error += 1,
+                _ => refused.single_view += 1,
+            }
+        }
+        refused
+    }
+
     /// All together.
     pub const fn total(self) -> usize {
         self.single_view + self.small_parallax + self.behind_camera + self.large_error
     }
 }
 
-/// The points of all tracks that `stations` (one a view; `None` for views without a place) see well enough.
-pub fn points(tracks: &[Track], stations: &[Option<Station>], rules: &Rules) -> (Vec<Vertex>, Refusals) {
-    let results: Vec<Result<Vertex, Refusals>> = tracks.par_iter().map(|track| point(track, stations, rules)).collect();
-    let mut refused = Refusals::default();
+/// The points of all tracks that `stations` (one a view; `None` for views without a place) see well enough, and the places
+/// of the other tracks in the list with the reasons.
+pub fn points(tracks: &[Track], stations: &[Option<Station>], rules: &Rules) -> (Vec<Vertex>, Vec<(usize, Reason)>) {
+    let results: Vec<Result<Vertex, Reason>> = tracks.par_iter().map(|track| point(track, stations, rules)).collect();
+    let mut refused = Vec::new();
     let mut vertices = Vec::with_capacity(results.len());
-    for result in results {
+    for (number, result) in results.into_iter().enumerate() {
         match result {
             Ok(vertex) => vertices.push(vertex),
-            Err(why) => {
-                refused.single_view += why.single_view;
-                refused.small_parallax += why.small_parallax;
-                refused.behind_camera += why.behind_camera;
-                refused.large_error += why.large_error;
-            }
+            Err(why) => refused.push((number, why)),
         }
     }
     (vertices, refused)
 }
 
-fn point(track: &Track, stations: &[Option<Station>], rules: &Rules) -> Result<Vertex, Refusals> {
-    let none = Refusals::default();
+fn point(track: &Track, stations: &[Option<Station>], rules: &Rules) -> Result<Vertex, Reason> {
     let sightings: Vec<Sighting<'_>> = track
         .sightings
         .iter()
         .filter_map(|&(view, at)| Some(Sighting { camera: &stations.get(view)?.as_ref()?.pinhole, at }))
         .collect();
     let found = triangulate(&sightings, rules.corner_deviation_px).map_err(|why| match why {
-        NoPoint::TooFewViews => Refusals { single_view: 1, ..none },
-        NoPoint::Behind => Refusals { behind_camera: 1, ..none },
-        _ => Refusals { small_parallax: 1, ..none },
+        NoPoint::TooFewViews => Reason::SingleView,
+        NoPoint::Behind => Reason::BehindCamera,
+        _ => Reason::SmallParallax { degree: None },
     })?;
     let parallax_degree = libm::asin(found.parallax_sine.min(1.0)).to_degrees();
     if parallax_degree < rules.min_parallax_degree {
-        return Err(Refusals { small_parallax: 1, ..none });
+        return Err(Reason::SmallParallax { degree: Some(parallax_degree) });
     }
     if !(found.reprojection_px <= rules.max_reprojection_px) {
-        return Err(Refusals { large_error: 1, ..none });
+        return Err(Reason::LargeError { reprojection_px: found.reprojection_px });
     }
     let c = found.covariance;
     Ok(Vertex {

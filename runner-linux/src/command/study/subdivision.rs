@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::io::{self, IsTerminal, Write};
 use std::path::PathBuf;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use daymark_core::mesh::SubdivisionLevel;
 use daymark_fixtures::{Light, Tower};
@@ -143,7 +143,8 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
 
 type Made = (Model, TowerViews);
 
-/// One level: one base at a time is in memory, with all tests.
+/// One level. Two clouds at a time are in memory, a base and a test, whatever the number of tests: those of the last levels
+/// have millions of points.
 fn study(
     level: SubdivisionLevel,
     bases: &[Made],
@@ -151,31 +152,34 @@ fn study(
     bar: &ProgressBar,
 ) -> Result<Row, CommandError> {
     let mut largest = 0;
-    let mut cloud = |model: &Model, views: &TowerViews| -> Result<Cloud, CommandError> {
+    let mut subdividing = Duration::ZERO;
+    let mut cloud = |model: &Model, views: &TowerViews, counts: bool| -> Result<Cloud, CommandError> {
+        let begin = Instant::now();
         let dense = model.dense(level, views.views(), views.stations())?;
         largest = largest.max(dense.positions.len() as u64 * BYTES_PER_POINT);
-        Ok(Cloud::of_dense(&dense))
+        let cloud = Cloud::of_dense(&dense);
+        if counts {
+            subdividing += begin.elapsed();
+        }
+        Ok(cloud)
     };
-    let begin = Instant::now();
-    let test_clouds: Vec<Cloud> =
-        tests.iter().map(|(_, model, views)| cloud(model, views)).collect::<Result<_, _>>()?;
-    let mut subdividing = begin.elapsed();
-    let mut comparing = std::time::Duration::ZERO;
-    let mut base_points = 0;
+    let mut comparing = Duration::ZERO;
+    let (mut base_points, mut test_points) = (0, 0);
     // Errors of each test: with its own base, and with those of other shape (2 and 5 share one).
     let (mut within, mut between) = (Vec::new(), Vec::new());
     let (mut alike, mut unlike) = (Vec::new(), Vec::new());
     let mut nearest_wrong = vec![f64::INFINITY; tests.len()];
     for (number, (model, views)) in bases.iter().enumerate() {
-        let begin = Instant::now();
-        let base = cloud(model, views)?;
-        subdividing += begin.elapsed();
+        let base = cloud(model, views, true)?;
         base_points += base.positions.len();
-        let begin = Instant::now();
-        for (at, (tower, ..)) in tests.iter().enumerate() {
-            let test = &test_clouds[at];
-            let reach = 0.015 * crate::classify::experiment::size(test);
-            let found = compare(test, &base, Similarity::shift(nalgebra::Vector3::zeros()), reach);
+        for (at, (tower, model, views)) in tests.iter().enumerate() {
+            // Made anew for each base; the first time says how long that takes.
+            let test = cloud(model, views, number == 0)?;
+            test_points += if number == 0 { test.positions.len() } else { 0 };
+            let begin = Instant::now();
+            let reach = 0.015 * crate::classify::experiment::size(&test);
+            let found = compare(&test, &base, Similarity::shift(nalgebra::Vector3::zeros()), reach);
+            comparing += begin.elapsed();
             let shape = libm::sqrt(found.shape.one_sided);
             let look = found.intensity.map_or(1.0, |intensity| intensity.free);
             let same_shape = [1, 4].contains(&number) && [1, 4].contains(tower);
@@ -190,7 +194,6 @@ fn study(
                 }
             }
         }
-        comparing += begin.elapsed();
         bar.inc(1);
     }
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len().max(1) as f64;
@@ -201,7 +204,7 @@ fn study(
         nearest_wrong_rms_millimetre: 1_000.0 * mean(&nearest_wrong),
         signal_to_noise: signal_to_noise(&within, &between),
         intensity_signal_to_noise: signal_to_noise(&alike, &unlike),
-        test_points: test_clouds.iter().map(|cloud| cloud.positions.len()).sum::<usize>() * 8 / tests.len().max(1),
+        test_points: test_points * 8 / tests.len().max(1),
         base_points,
         largest_cloud_bytes: largest,
         subdivide_second: subdividing.as_secs_f64(),

@@ -13,7 +13,7 @@ use crate::classify::align::Align;
 use crate::classify::cloud::Cloud;
 use crate::classify::decide::Answer;
 use crate::classify::experiment::{Method, Row, compare_with_each, size, without};
-use crate::classify::towers::{BASE_ANGLES, Conditions, TEST_ANGLES, TowerViews};
+use crate::classify::towers::{BASE_ANGLES, Conditions, TEST_ANGLES, TowerViews, TrueSurface};
 
 /// Version of the form of `--json`.
 const SCHEMA_VERSION: u32 = 1;
@@ -91,6 +91,9 @@ struct TowerRow {
     by_appearance: bool,
     margin: f64,
     refused_when_absent: bool,
+    /// Median and 95th percentile of the distances of the test's points from the true surface.
+    true_surface_median_millimetre: f64,
+    true_surface_p95_millimetre: f64,
 }
 
 /// All seeds together.
@@ -130,6 +133,7 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
         tests.push(TowerViews::new(tower, &TEST_ANGLES, &grey, false));
         progress.inc(1);
     }
+    let surfaces: Vec<TrueSurface> = towers.iter().map(TrueSurface::new).collect();
     let mut seeds = Seeds { count: args.seeds, smallest_margin: f64::INFINITY, ..Seeds::default() };
     let mut rows = Vec::new();
     for seed in 0..u64::from(args.seeds) {
@@ -137,7 +141,7 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
             let noise_seed = seed * 8 + number as u64;
             let noisy = views.clone().with_gray_noise(args.noise_gray, noise_seed);
             let test = noisy.cloud(args.noise_px, noise_seed, level)?;
-            let row = test_row(number, &test, &bases, &method);
+            let row = test_row(number, &test, &bases, &surfaces[number], &method);
             seeds.enter(&row);
             if seed == 0 {
                 rows.push(row);
@@ -189,7 +193,9 @@ fn progress_bar(length: u64) -> ProgressBar {
     bar
 }
 
-fn test_row(number: usize, test: &Cloud, bases: &[Cloud], method: &Method) -> TowerRow {
+fn test_row(number: usize, test: &Cloud, bases: &[Cloud], surface: &TrueSurface, method: &Method) -> TowerRow {
+    let points = test.positions.iter().map(|point| nalgebra::Vector3::from(point.map(f64::from)));
+    let [median, p95] = surface.distances(points).map(|metres| metres * 1_000.0);
     let extent = size(test);
     let comparisons = compare_with_each(test, bases, method);
     let row = Row::new(String::new(), extent, &comparisons, method);
@@ -208,6 +214,8 @@ fn test_row(number: usize, test: &Cloud, bases: &[Cloud], method: &Method) -> To
         answer_tower: answer,
         by_appearance,
         margin: row.decision.margin,
+        true_surface_median_millimetre: median,
+        true_surface_p95_millimetre: p95,
         refused_when_absent: matches!(without(number, extent, &comparisons, method), Answer::Unknown(_)),
     }
 }
@@ -286,6 +294,16 @@ fn text(document: &Document) -> String {
             "{:<16} {answer}{how}, closest wrong / right {:.2}; without its base: {absent}",
             format!("{} {name}", row.tower),
             row.margin
+        );
+    }
+    let _ = writeln!(text, "\nTrue surface: distance of the test's points from it, mm (median, 95 %)");
+    for (row, name) in document.rows.iter().zip(&document.towers) {
+        let _ = writeln!(
+            text,
+            "{:<16}{:>9.0}{:>9.0}",
+            format!("{} {name}", row.tower),
+            row.true_surface_median_millimetre,
+            row.true_surface_p95_millimetre
         );
     }
     let seeds = &document.seeds;

@@ -167,6 +167,15 @@ pub(super) fn text(facts: &Facts, path: &Path, explain: bool) -> String {
              {} third at an edge; {} seen by no view",
             dropped.flipped, dropped.grazing, dropped.hiding, dropped.covered, dropped.crossing, facts.unseen_triangles
         );
+        if let Some(explained) = &facts.explained {
+            let _ = writeln!(text, "  left out (view and pixels of the size used, without distortion):");
+            for left_out in &explained.left_out {
+                let _ = writeln!(text, "    {left_out}");
+            }
+            if explained.not_told > 0 {
+                let _ = writeln!(text, "    and {} more", explained.not_told);
+            }
+        }
     }
     text
 }
