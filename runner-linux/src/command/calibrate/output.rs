@@ -220,8 +220,11 @@ impl Facts {
             "\n{} x {} px, {} corners, rms {:.3} px",
             self.width_px, self.height_px, lens.corners, lens.rms_px
         );
-        for ParameterFacts { name, value, standard_deviation } in &lens.parameters {
-            let digits = if *standard_deviation > 0.0 { decimals(*standard_deviation) } else { 6 };
+        // What has no deviation was not looked for.
+        for ParameterFacts { name, value, standard_deviation } in
+            lens.parameters.iter().filter(|parameter| parameter.standard_deviation > 0.0)
+        {
+            let digits = decimals(*standard_deviation);
             let _ = writeln!(text, "{name:>4} {value:>14.digits$} +- {standard_deviation:.digits$}");
         }
         let [across, down] = lens.field_of_view_degrees;

@@ -58,7 +58,9 @@ unsafe extern "C" fn reset() -> ! {
 
 fn semihosting(operation: u32, argument: usize) -> ! {
     call(operation, argument);
-    loop {}
+    loop {
+        core::hint::spin_loop();
+    }
 }
 
 fn call(operation: u32, argument: usize) {
