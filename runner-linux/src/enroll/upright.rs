@@ -27,6 +27,8 @@ pub struct Upright {
 
 /// A wall's normal is level within this, as the sine of its slope to the first guess of up.
 const LEVEL_SINE: f64 = 0.35;
+/// Walls that slope by this count half, round by round.
+const SLOPES: [f64; 6] = [0.35, 0.2, 0.1, 0.05, 0.03, 0.03];
 /// A front has at least this share of all walls.
 const LEAST_FRONT: f64 = 0.2;
 /// Walls within this of one another's direction are one front, degrees.
@@ -98,24 +100,32 @@ impl Walls {
     /// The rotation that makes up of what is up.
     fn levelling(&self, made: &Reconstruction, rough: &Similarity) -> Option<Matrix3<f64>> {
         let stations: Vec<_> = made.stations.iter().flatten().collect();
-        let mut sum = Matrix3::zeros();
+        let mut level = Matrix3::zeros();
         for station in &stations {
             let across = rough.rotation * station.pose.view_from_model.row(0).transpose();
-            sum += across * across.transpose() / stations.len() as f64;
+            level += across * across.transpose() / stations.len() as f64;
         }
-        let whole: f64 = self.normals.iter().map(|(_, seen)| seen).sum();
-        for (normal, seen) in &self.normals {
-            sum += normal * normal.transpose() * (seen / whole);
-        }
-        let eigen = sum.symmetric_eigen();
-        let least = eigen.eigenvalues.imin();
-        let up = eigen.eigenvectors.column(least).into_owned();
-        let up = if up.z < 0.0 { -up } else { up };
-        // One straight row of cameras before nothing upright leaves it open: the first guess stands.
-        let others = (0..3).filter(|&axis| axis != least).map(|axis| eigen.eigenvalues[axis]);
-        let certain = others.fold(f64::INFINITY, f64::min) > 4.0 * eigen.eigenvalues[least].max(1e-4);
-        if !certain || up.z < 0.8 {
-            return Some(Matrix3::identity());
+        let mut up = Vector3::z();
+        for slope in SLOPES {
+            // Roofs and ledges lean all to one side: what slopes by more counts little.
+            let weighed = self.normals.iter().map(|(normal, seen)| {
+                let off = normal.dot(&up) / slope;
+                (normal, seen / (1.0 + off * off))
+            });
+            let whole: f64 = weighed.clone().map(|(_, weight)| weight).sum();
+            let walls: Matrix3<f64> =
+                weighed.map(|(normal, weight)| normal * normal.transpose() * (weight / whole)).sum();
+            let eigen = (level + walls).symmetric_eigen();
+            let least = eigen.eigenvalues.imin();
+            // One straight row of cameras before nothing upright leaves it open: the guess before stands.
+            let others = (0..3).filter(|&axis| axis != least).map(|axis| eigen.eigenvalues[axis]);
+            let certain = others.fold(f64::INFINITY, f64::min) > 4.0 * eigen.eigenvalues[least].max(1e-4);
+            let found = eigen.eigenvectors.column(least).into_owned();
+            let found = if found.z < 0.0 { -found } else { found };
+            if !certain || found.z < 0.8 {
+                break;
+            }
+            up = found;
         }
         Rotation3::rotation_between(&up, &Vector3::z()).map(Rotation3::into_inner)
     }
