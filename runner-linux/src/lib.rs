@@ -28,6 +28,7 @@ pub mod table_file;
 pub mod observer;
 pub mod dataset;
 mod calendar;
+mod parallel;
 mod log;
 pub mod frame;
 pub mod report;
