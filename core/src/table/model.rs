@@ -201,25 +201,25 @@ impl<'a> StoredModel<'a> {
 
     /// Point `index`.
     pub fn get(&self, index: usize) -> Option<ModelPoint> {
-        self.points.get(index).map(|bytes| self.unpacked(bytes))
+        self.points.get(index).map(|bytes| self.unpacked(*bytes))
     }
 
     /// Point `index` as it is stored, in units.
     pub fn packed(&self, index: usize) -> Option<PackedPoint> {
-        self.points.get(index).map(point_of)
+        self.points.get(index).map(|bytes| point_of(*bytes))
     }
 
     /// All points: those of one view after those of another, by corner.
     pub fn points(&self) -> impl ExactSizeIterator<Item = ModelPoint> + Clone + use<'a> {
         let model = *self;
-        self.points.iter().map(move |bytes| model.unpacked(bytes))
+        self.points.iter().map(move |bytes| model.unpacked(*bytes))
     }
 
     /// The views whose corners have places: the number among the landmark's views, and which points are its.
     pub fn views(&self) -> impl Iterator<Item = (u16, Range<usize>)> + Clone + use<'a> {
         let mut begin = 0_usize;
         self.groups.iter().map(move |group| {
-            let (view, count) = group_of(group);
+            let (view, count) = group_of(*group);
             let end = begin.saturating_add(usize::from(count));
             (view, core::mem::replace(&mut begin, end)..end)
         })
@@ -227,10 +227,10 @@ impl<'a> StoredModel<'a> {
 
     /// The surface: numbers of points, counter-clockwise seen from outside.
     pub fn triangles(&self) -> impl ExactSizeIterator<Item = [u16; 3]> + Clone + use<'a> {
-        self.triangles.iter().map(triangle_of)
+        self.triangles.iter().map(|bytes| triangle_of(*bytes))
     }
 
-    fn unpacked(&self, bytes: &[u8; POINT_BYTES]) -> ModelPoint {
+    fn unpacked(&self, bytes: [u8; POINT_BYTES]) -> ModelPoint {
         let PackedPoint { corner, units } = point_of(bytes);
         ModelPoint { corner, position: units.map(|x| f64::from(x) * self.unit()) }
     }
@@ -286,7 +286,7 @@ impl<'a> StoredModel<'a> {
         let mut next = 0_u32;
         let mut points = 0_usize;
         for group in self.groups {
-            let (found, count) = group_of(group);
+            let (found, count) = group_of(*group);
             if u32::from(found) < next || u32::from(found) >= views || count == 0 {
                 return Err(ModelFault::View { found });
             }
@@ -299,7 +299,7 @@ impl<'a> StoredModel<'a> {
         for (_, range) in self.views() {
             let mut next = 0_u16;
             for (point, bytes) in range.clone().zip(self.points.get(range).unwrap_or_default()) {
-                let corner = point_of(bytes).corner;
+                let corner = point_of(*bytes).corner;
                 if corner < next || corner >= corners_limit {
                     return Err(ModelFault::Corner { point, corner });
                 }
@@ -308,7 +308,7 @@ impl<'a> StoredModel<'a> {
         }
         let mut before = None;
         for (index, bytes) in self.triangles.iter().enumerate() {
-            let triangle = triangle_of(bytes);
+            let triangle = triangle_of(*bytes);
             let [a, b, c] = triangle;
             let there = usize::from(b.max(c)) < self.points.len();
             if !there || a >= b || a >= c || b == c || before.is_some_and(|before| before >= triangle) {
@@ -404,18 +404,18 @@ fn check_counts(points: usize, triangles: usize) -> Result<(), ModelFault> {
     Ok(())
 }
 
-fn group_of(bytes: &[u8; GROUP_BYTES]) -> (u16, u16) {
-    let [v0, v1, c0, c1] = *bytes;
+fn group_of(bytes: [u8; GROUP_BYTES]) -> (u16, u16) {
+    let [v0, v1, c0, c1] = bytes;
     (u16::from_le_bytes([v0, v1]), u16::from_le_bytes([c0, c1]))
 }
 
-fn point_of(bytes: &[u8; POINT_BYTES]) -> PackedPoint {
-    let [c0, c1, x0, x1, y0, y1, z0, z1] = *bytes;
+fn point_of(bytes: [u8; POINT_BYTES]) -> PackedPoint {
+    let [c0, c1, x0, x1, y0, y1, z0, z1] = bytes;
     PackedPoint { corner: u16::from_le_bytes([c0, c1]), units: [[x0, x1], [y0, y1], [z0, z1]].map(i16::from_le_bytes) }
 }
 
-fn triangle_of(bytes: &[u8; TRIANGLE_BYTES]) -> [u16; 3] {
-    let [a0, a1, b0, b1, c0, c1] = *bytes;
+fn triangle_of(bytes: [u8; TRIANGLE_BYTES]) -> [u16; 3] {
+    let [a0, a1, b0, b1, c0, c1] = bytes;
     [[a0, a1], [b0, b1], [c0, c1]].map(u16::from_le_bytes)
 }
 

@@ -1,6 +1,6 @@
 //! The nearest point of a cloud: a balanced k-d tree with its points in the leaves.
 
-use crate::parallel;
+use rayon::prelude::*;
 
 /// Points of a leaf, at most.
 const LEAF: usize = 16;

@@ -4,9 +4,9 @@ use std::fmt;
 
 use daymark_core::mesh::{MeshCounts, MeshError, SubdivisionLevel, TriangleMesh, storage_words};
 use nalgebra::Vector3;
+use rayon::prelude::*;
 
 use super::view::{Station, Surface, View};
-use crate::parallel;
 
 /// Points of a dense cloud, at most: with triangles 1.2 GB ([`BYTES_PER_POINT`]).
 pub const MAX_POINTS: u64 = 24_000_000;

@@ -8,13 +8,13 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::Vector3;
+use rayon::prelude::*;
 use serde::Serialize;
 use spade::handles::FixedVertexHandle;
 use spade::{DelaunayTriangulation, HasPosition, Point2, Triangulation};
 
 use super::cells::{Cells, bounds};
 use super::view::{Station, Surface, Vertex};
-use crate::parallel;
 
 /// What was dropped, and why.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]

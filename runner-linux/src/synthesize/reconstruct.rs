@@ -15,7 +15,7 @@ use super::motion::{NoMotion, motion};
 use super::triangulate::Rules;
 use super::view::{Station, Track, View};
 use crate::camera_file::lens::Pose;
-use crate::parallel;
+use rayon::prelude::*;
 
 /// Where correspondences come from.
 #[derive(Debug, Clone)]
@@ -223,9 +223,10 @@ type Found = (Vec<PairMatches>, Vec<Track>, RemovedMatches, Explained);
 fn correspondences(views: &[View], geometry: Geometry<'_>, corners: &Corners) -> Result<Found, NoModel> {
     match corners {
         Corners::Automatic => {
-            let found: Vec<ViewFeatures> = parallel::try_map(views, |view| {
-                features(view).map_err(|error| NoModel::Picture(format!("{}: {error}", view.name)))
-            })?;
+            let found: Vec<ViewFeatures> = views
+                .par_iter()
+                .map(|view| features(view).map_err(|error| NoModel::Picture(format!("{}: {error}", view.name))))
+                .collect::<Result<_, _>>()?;
             let pairs = correspond::pairs(views, &found, geometry);
             let (tracks, removed, explained) = correspond::tracks(&found, &pairs);
             Ok((pairs, tracks, removed, explained))

@@ -2,11 +2,11 @@
 
 use daymark_core::camera::triangulate::{NoPoint, Sighting, triangulate};
 use nalgebra::{Matrix3, Vector3};
+use rayon::prelude::*;
 use serde::Serialize;
 
 use super::explain::Reason;
 use super::view::{Station, Track, Vertex};
-use crate::parallel;
 
 /// When a point is refused.
 #[derive(Debug, Clone, Copy, PartialEq)]
