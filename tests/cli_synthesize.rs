@@ -1,51 +1,13 @@
 //! `daymark synthesize` as a person runs it: models of the fixtures' towers, and input that cannot work.
 
+#[path = "support/shoot.rs"]
+mod shoot;
 #[path = "support/mod.rs"]
 mod support;
 
-use std::fmt::Write as _;
-
-use daymark_fixtures::{Camera, Lens, Light, Scene, Sensor, Site, Tower, Vec3, View, render, view};
+use daymark_fixtures::{Camera, Lens, Scene, Site, Tower, Vec3, View, view};
+use shoot::{files, shoot, shoot_with};
 use support::Town;
-
-/// Renders a tower from these angles: `t<tower>-<n>.pgm`, its `.camera` file and its true corners as `.csv`.
-fn shoot(town: &Town, number: usize, angles: &[f64]) -> Vec<String> {
-    let tower = &Tower::eight()[number - 1];
-    let scene = Scene::alone(tower.clone(), 40 + number as u64).lit(Light::morning());
-    let cameras: Vec<Camera> =
-        angles.iter().map(|&angle| Camera::before(Site::ORIGIN, view::stand(tower, angle), Lens::VGA)).collect();
-    shoot_with(town, &format!("t{number}"), &scene, &cameras)
-}
-
-fn shoot_with(town: &Town, stem: &str, scene: &Scene, cameras: &[Camera]) -> Vec<String> {
-    let mut names = Vec::new();
-    for (number, camera) in (1..).zip(cameras) {
-        let frame = render(scene, camera, &Sensor::daylight(number));
-        let name = format!("{stem}-{number}");
-        town.write(&format!("{name}.pgm"), frame.pgm());
-        let (cx, cy) = camera.principal_point();
-        let mut text = format!("{} 0 {cx}\n0 {} {cy}\n0 0 1\n0 0 0\n", camera.focal, camera.focal);
-        // The columns of camera-to-world are the view's axes.
-        let [right, down, forward] = camera.view_from_world;
-        for row in [|v: Vec3| v.x, |v: Vec3| v.y, |v: Vec3| v.z] {
-            let _ = writeln!(text, "{} {} {}", row(right), row(down), row(forward));
-        }
-        let _ = writeln!(text, "{} {} {}", camera.position.x, camera.position.y, camera.position.z);
-        let _ = writeln!(text, "{} {}", camera.width, camera.height);
-        town.write(&format!("{name}.camera"), text);
-        let mut corners = "number,x,y\n".to_owned();
-        for corner in frame.truth.visible(0) {
-            let _ = writeln!(corners, "{},{},{}", corner.number, corner.image.x, corner.image.y);
-        }
-        town.write(&format!("{name}.csv"), corners);
-        names.push(name);
-    }
-    names
-}
-
-fn arguments(names: &[String], ending: &str) -> Vec<String> {
-    names.iter().map(|name| format!("{name}.{ending}")).collect()
-}
 
 /// `daymark synthesize` with these pictures and options.
 fn synthesize(town: &Town, pictures: &[String], options: &[&str]) -> support::Ran {
@@ -59,8 +21,7 @@ fn synthesize(town: &Town, pictures: &[String], options: &[&str]) -> support::Ra
 fn picked_corners_and_known_cameras_give_the_tower() {
     let town = Town::new();
     let names = shoot(&town, 1, &[-8.0, 22.0]);
-    let (pictures, cameras, corners) =
-        (arguments(&names, "pgm"), arguments(&names, "camera"), arguments(&names, "csv"));
+    let (pictures, cameras, corners) = (files(&names, "pgm"), files(&names, "camera"), files(&names, "csv"));
     let mut options = vec!["-o", "tower.ply", "--levels", "2", "--json", "--cameras"];
     options.extend(cameras.iter().map(String::as_str));
     options.push("--corners");
@@ -88,7 +49,7 @@ fn picked_corners_and_known_cameras_give_the_tower() {
 fn found_corners_give_the_same_model_with_any_number_of_threads() {
     let town = Town::new();
     let names = shoot(&town, 2, &[-8.0, 10.0]);
-    let (pictures, cameras) = (arguments(&names, "pgm"), arguments(&names, "camera"));
+    let (pictures, cameras) = (files(&names, "pgm"), files(&names, "camera"));
     let mut files = Vec::new();
     for threads in ["1", "3"] {
         let mut command = town.command();
@@ -115,7 +76,7 @@ fn found_corners_give_the_same_model_with_any_number_of_threads() {
 fn a_focal_length_is_enough_for_motion_and_shape() {
     let town = Town::new();
     let names = shoot(&town, 8, &[-20.0, -6.0, 8.0]);
-    let pictures = arguments(&names, "pgm");
+    let pictures = files(&names, "pgm");
     let options = ["--focal-px", "560", "--fixed-lens", "-o", "tower.obj", "--json", "--distance-m"];
     // The first two stand 14 degrees apart on a circle.
     let radius = Tower::eight()[7].height() * 1.06 + 10.0;
@@ -137,7 +98,7 @@ fn a_focal_length_is_enough_for_motion_and_shape() {
 fn what_cannot_work_is_refused_with_its_figure_and_without_a_file() {
     let town = Town::new();
     let names = shoot(&town, 3, &[-8.0, 22.0]);
-    let pictures = arguments(&names, "pgm");
+    let pictures = files(&names, "pgm");
     let before = town.names();
     synthesize(&town, &pictures[..1], &["-o", "m.glb"]).refused(&["one picture has no depth"]);
     synthesize(&town, &pictures, &["-o", "m.stl"]).refused(&["m.stl should end in .glb"]);
@@ -151,7 +112,7 @@ fn what_cannot_work_is_refused_with_its_figure_and_without_a_file() {
 fn cameras_of_other_pictures_do_not_fit() {
     let town = Town::new();
     let names = shoot(&town, 4, &[-20.0, 0.0]);
-    let pictures = arguments(&names, "pgm");
+    let pictures = files(&names, "pgm");
     // The two cameras exchanged: no look-alikes agree.
     let ran = synthesize(&town, &pictures, &["-o", "m.glb", "--cameras", "t4-2.camera", "t4-1.camera"]);
     assert_eq!(ran.code, Some(1), "{ran:#?}");
@@ -174,14 +135,14 @@ fn two_buildings_a_turn_and_a_plane_have_no_model() {
         assert!(!town.names().iter().any(|name| name == "m.glb"));
     };
     let (one, other) = (shoot(&town, 1, &[7.0]), shoot(&town, 6, &[7.0]));
-    refused(&[arguments(&one, "pgm"), arguments(&other, "pgm")].concat(), "no two pictures share one geometry: of");
+    refused(&[files(&one, "pgm"), files(&other, "pgm")].concat(), "no two pictures share one geometry: of");
 
     let tower = Tower::eight()[1].clone();
     let stand = Camera::before(Site::ORIGIN, view::stand(&tower, 10.0), Lens::VGA);
     let scene = Scene::alone(tower.clone(), 3);
     let turned = Camera::look_at(stand.position, Vec3::new(5.0, 0.0, 14.0), Lens::VGA);
     let turn = shoot_with(&town, "turn", &scene, &[stand, turned]);
-    refused(&arguments(&turn, "pgm"), "the camera only turned: a rotation alone explains");
+    refused(&files(&turn, "pgm"), "the camera only turned: a rotation alone explains");
 
     // Close to a wall there is nothing but the wall.
     let wall = |x: f64, z: f64| {
@@ -189,7 +150,7 @@ fn two_buildings_a_turn_and_a_plane_have_no_model() {
     };
     let scene = View::enrollment(&tower, Lens::VGA)[0].scene.clone();
     let plane = shoot_with(&town, "plane", &scene, &[wall(-3.0, 9.0), wall(3.0, 10.0)]);
-    let ran = synthesize(&town, &arguments(&plane, "pgm"), &["-o", "m.glb", "--focal-px", "900", "--fixed-lens"]);
+    let ran = synthesize(&town, &files(&plane, "pgm"), &["-o", "m.glb", "--focal-px", "900", "--fixed-lens"]);
     assert_eq!(ran.code, Some(1), "{ran:#?}");
     // The motion that a plane leaves in doubt may have hardly any parallax: either figure refuses it.
     let said = ["lies in one plane", "taken from nearly one place"].iter().any(|reason| ran.stderr.contains(reason));
@@ -200,9 +161,9 @@ fn two_buildings_a_turn_and_a_plane_have_no_model() {
 fn without_any_focal_length_the_model_says_what_it_is() {
     let town = Town::new();
     let names = shoot(&town, 7, &[-8.0, 8.0]);
-    let corners = arguments(&names, "csv");
+    let corners = files(&names, "csv");
     let mut options = vec!["-o", "m.ply", "--json", "--corners"];
     options.extend(corners.iter().map(String::as_str));
-    let facts = synthesize(&town, &arguments(&names, "pgm"), &options).succeeded().json();
+    let facts = synthesize(&town, &files(&names, "pgm"), &options).succeeded().json();
     assert_eq!((&facts["shape"], &facts["length_unit"]), (&"affine".into(), &"affine".into()));
 }

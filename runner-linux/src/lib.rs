@@ -8,6 +8,7 @@
 //!  picture ─── correspond                       which corner of one picture is which of another
 //!  dataset ─── command::evaluate                how often that is right
 //!  frame ───── watch ──────── output            a camera becomes answers that stand until they are withdrawn
+//!  picture ─── calibrate ──── camera_file       boards in pictures become a lens; lens_source: where a frame's comes from
 //!  camera_file ─ synthesize ─ model_file        pictures and cameras become textured models, and models files
 //!                    └─────── classify          which of several models a model is
 //! ```
@@ -18,6 +19,7 @@ pub mod simd;
 pub mod engine;
 pub mod camera_file;
 pub mod lens_source;
+pub mod calibrate;
 pub mod synthesize;
 pub mod classify;
 pub mod model_file;

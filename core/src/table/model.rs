@@ -21,11 +21,11 @@ pub const TRIANGLE_BYTES: usize = 6;
 /// Bytes of a modelled view: its number 2, how many of its corners have a place 2.
 const GROUP_BYTES: usize = 4;
 
-/// Bytes before the views of a model, at most: unit 4, scale 1 + 3, azimuth 1 + 3 + 3, deviation 3, three counts of 3.
-const FIELDS_BYTES: usize = 27;
+/// Bytes before the views of a model, at most: unit 5, scale 1 + 3, azimuth 1 + 3 + 3, deviation 3, three counts of 3.
+const FIELDS_BYTES: usize = 28;
 
-/// Bytes of a model's record, at least: nine fields of one byte, one view, three points.
-pub(super) const MODEL_BYTES_LEAST: usize = 8 + GROUP_BYTES + 3 * POINT_BYTES;
+/// Bytes of a model's record, at least: seven fields of one byte, one view, three points.
+pub(super) const MODEL_BYTES_LEAST: usize = 7 + GROUP_BYTES + 3 * POINT_BYTES;
 
 /// Bytes of a model's record, at most.
 pub(super) const MODEL_BYTES_MOST: u32 = (FIELDS_BYTES

@@ -1,10 +1,11 @@
-//! Lenses from OpenCV's `FileStorage` YAML and ROS' `camera_info` YAML.
+//! Lenses from and to OpenCV's `FileStorage` YAML and ROS' `camera_info` YAML.
 //!
 //! Both are a small part of YAML (and OpenCV's first line is none): keys at the beginning of a line, numbers, and `data:`
 //! lists in brackets. That part is read here.
 
 use super::FileCamera;
 use super::distortion::Distortion;
+use super::lens::Lens;
 
 const MATRIX: [&str; 5] = ["camera_matrix", "cameraMatrix", "Camera_Matrix", "K", "intrinsics"];
 const COEFFICIENTS: [&str; 5] =
@@ -107,6 +108,67 @@ fn list(text: &str, key: &str) -> Option<Result<Vec<f64>, String>> {
     Some(super::numbers(inside.get(..close)?))
 }
 
+/// Which of the two forms is written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Form {
+    /// `cv::FileStorage` reads it.
+    OpenCv,
+    /// `camera_info_manager` and `camera_calibration_parsers` read it.
+    Ros,
+}
+
+/// The text of a file that holds this lens; [`parse`] gives the same numbers back, to the last bit. `notes` are further
+/// keys with their values, which readers pass over that do not know them. `None` for a distortion that these forms do not know.
+pub fn text(lens: &Lens, form: Form, camera_name: &str, notes: &[(&str, f64)]) -> Option<String> {
+    let (model, coefficients) = match lens.distortion {
+        Distortion::None => ("plumb_bob", vec![0.0; 5]),
+        Distortion::Radial { radial: [k1, k2, k3, k4, k5, k6], tangential: [p1, p2] } => {
+            let short = vec![k1, k2, p1, p2, k3];
+            let rational = [k4, k5, k6];
+            if rational == [0.0; 3] {
+                ("plumb_bob", short)
+            } else {
+                ("rational_polynomial", [short.as_slice(), &rational].concat())
+            }
+        }
+        Distortion::Fisheye(k) => ("equidistant", k.to_vec()),
+        Distortion::FieldOfView(_) => return None,
+    };
+    let ([fx, fy], [cx, cy]) = (lens.focal, lens.centre);
+    let matrix = [fx, lens.skew, cx, 0.0, fy, cy, 0.0, 0.0, 1.0];
+    let identity = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
+    let projection = [fx, lens.skew, cx, 0.0, 0.0, fy, cy, 0.0, 0.0, 0.0, 1.0, 0.0];
+    let list = |numbers: &[f64]| numbers.iter().map(|n| format!("{n:?}")).collect::<Vec<_>>().join(", ");
+    let entry = |key: &str, rows: usize, numbers: &[f64]| {
+        let columns = numbers.len() / rows;
+        let data = list(numbers);
+        match form {
+            Form::OpenCv => {
+                format!("{key}: !!opencv-matrix\n   rows: {rows}\n   cols: {columns}\n   dt: d\n   data: [ {data} ]\n")
+            }
+            Form::Ros => format!("{key}:\n  rows: {rows}\n  cols: {columns}\n  data: [{data}]\n"),
+        }
+    };
+    let header = match form {
+        Form::OpenCv => "%YAML:1.0\n---\n",
+        Form::Ros => "",
+    };
+    let mut parts = vec![format!("{header}image_width: {}\nimage_height: {}\n", lens.width, lens.height)];
+    if form == Form::Ros {
+        parts.push(format!("camera_name: {camera_name}\n"));
+    }
+    parts.push(entry("camera_matrix", 3, &matrix));
+    parts.push(format!("distortion_model: {model}\n"));
+    // OpenCV wants a column, ROS a row.
+    parts.push(entry("distortion_coefficients", if form == Form::Ros { 1 } else { coefficients.len() }, &coefficients));
+    if form == Form::Ros {
+        parts.push(entry("rectification_matrix", 3, &identity));
+        parts.push(entry("projection_matrix", 3, &projection));
+    }
+    parts.extend(notes.iter().map(|(key, value)| format!("{key}: {value:?}\n")));
+    Some(parts.concat())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -139,5 +201,37 @@ mod tests {
         // A matrix without data does not take the next list.
         let cut = ROS.replace("  data: [400, 0, 400, 0, 401, 300, 0, 0, 1]\n", "");
         assert!(parse(&cut).is_err());
+    }
+
+    #[test]
+    fn what_is_written_is_read_to_the_last_bit() {
+        let third = 1.0 / 3.0;
+        let models = [
+            Distortion::Radial {
+                radial: [-0.1 * third, 1e-17, third, 0.0, 0.0, 0.0],
+                tangential: [1e-3 * third, -2e-5],
+            },
+            Distortion::Radial { radial: [third; 6], tangential: [0.0, -third] },
+            Distortion::Fisheye([third, -1e-9, 0.0, 2.0]),
+            Distortion::None,
+        ];
+        for distortion in models {
+            let lens = Lens {
+                focal: [1e3 * third, 334.0],
+                centre: [319.5 + 1e-13, 1e2 * third],
+                distortion,
+                ..Lens::of_focal(640, 480, 1.0)
+            };
+            for form in [Form::OpenCv, Form::Ros] {
+                let text = text(&lens, form, "front", &[(FOCAL_ERROR, 0.001 * third)]).unwrap();
+                let camera = parse(&text).unwrap();
+                assert_eq!(camera.lens(640, 480).unwrap(), lens, "{text}");
+                assert_eq!(camera.focal_error, Some(0.001 * third));
+            }
+        }
+        assert_eq!(
+            text(&Lens { distortion: Distortion::FieldOfView(0.9), ..Lens::of_focal(9, 9, 9.0) }, Form::Ros, "", &[]),
+            None
+        );
     }
 }

@@ -4,6 +4,7 @@
 //! answer, 2 error.
 
 pub mod bench;
+pub mod calibrate;
 pub mod correspond;
 pub mod classify;
 pub mod demo;
@@ -44,6 +45,8 @@ enum Command {
     Synthesize(synthesize::Args),
     /// Say which of several models a model is, by shape and appearance
     Classify(classify::Args),
+    /// Find out what a camera's lens does, from pictures of a chessboard, so that positions are exact
+    Calibrate(calibrate::Args),
     /// Look into, check, merge and change landmark tables
     Table(table::Args),
     /// Measure recall, false answers and time on a folder of pictures with a manifest
@@ -90,6 +93,7 @@ impl Cli {
             Command::Correspond(args) => correspond::run(&args),
             Command::Synthesize(args) => synthesize::run(&args),
             Command::Classify(args) => classify::run(&args),
+            Command::Calibrate(args) => calibrate::run(&args),
             Command::Table(args) => table::run(&args),
             Command::Evaluate(args) => evaluate::run(&args),
             Command::Bench(args) => bench::run(&args),

@@ -198,7 +198,7 @@ fn small_view(view: &View, gray: &GrayImage) -> View {
 fn small_points(views: &[View], stations: &[Option<Station>]) -> Result<Vec<Vertex>, WithoutModel> {
     let picture = |error| WithoutModel::Pictures(NoModel::Picture(format!("{error}")));
     let found = views.iter().map(features).collect::<Result<Vec<_>, _>>().map_err(picture)?;
-    let (tracks, _) = tracks(&found, &pairs(views, &found, Geometry::Known(stations)));
+    let (tracks, ..) = tracks(&found, &pairs(views, &found, Geometry::Known(stations)));
     Ok(points(&tracks, stations, &Rules { max_reprojection_px: 2.0, ..Rules::default() }).0)
 }
 
