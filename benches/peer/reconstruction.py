@@ -10,6 +10,9 @@ Both see the same pictures at the same size. The truth: a folder of `.camera` fi
 are compared after the similarity that fits them best; errors are shares of the mean distance between successive true
 centres. The reprojection error of the peer is that of its two-view points (median of the pairs' RMS over inliers).
 
+Where the truth has points (COLMAP's points3D.txt) the distance of daymark's points from the surface there is told, too: from
+the plane through the eight nearest of them, after the same similarity, as a share of the mean distance to the cameras.
+
     python3 benches/peer/reconstruction.py --images DIR --truth DIR --focal-px F [--daymark target/release/daymark]
 """
 
@@ -49,8 +52,8 @@ def truth_of(folder: Path) -> dict[str, np.ndarray]:
     return centres
 
 
-def errors(found: dict[str, np.ndarray], truth: dict[str, np.ndarray]) -> dict[str, float]:
-    """Distances of the centres after the best similarity, as shares of the mean step between true centres."""
+def similarity(found: dict[str, np.ndarray], truth: dict[str, np.ndarray]):
+    """Both lists of centres, and the map from one to the other that fits best."""
     names = sorted(name for name in found if name in truth)
     a = np.array([found[name] for name in names])
     b = np.array([truth[name] for name in names])
@@ -59,9 +62,45 @@ def errors(found: dict[str, np.ndarray], truth: dict[str, np.ndarray]) -> dict[s
     signs = np.array([1, 1, np.sign(np.linalg.det(u @ vt))])
     turn = u @ np.diag(signs) @ vt
     scale = (s * signs).sum() / ((a - ca) ** 2).sum()
-    off = np.linalg.norm((scale * (turn @ (a - ca).T)).T - (b - cb), axis=1)
+    return a, b, lambda points: scale * (points - ca) @ turn.T + cb
+
+
+def errors(found: dict[str, np.ndarray], truth: dict[str, np.ndarray]) -> dict[str, float]:
+    """Distances of the centres after the best similarity, as shares of the mean step between true centres."""
+    a, b, moved = similarity(found, truth)
+    off = np.linalg.norm(moved(a) - b, axis=1)
     step = np.linalg.norm(np.diff(b, axis=0), axis=1).mean()
-    return {"views": len(names), "largest_share": float(off.max() / step), "mean_share": float(off.mean() / step)}
+    return {"views": len(a), "largest_share": float(off.max() / step), "mean_share": float(off.mean() / step)}
+
+
+def points_of(folder: Path) -> np.ndarray | None:
+    """COLMAP's points that three views or more see within a pixel; None if there are none."""
+    path = folder / "points3D.txt"
+    if not path.is_file():
+        return None
+    rows = [line.split() for line in path.read_text().splitlines() if line and not line.startswith("#")]
+    good = [row[1:4] for row in rows if float(row[7]) < 1.0 and len(row) >= 8 + 2 * 3]
+    return np.array(good, float)
+
+
+def vertices_of(path: Path, count: int) -> np.ndarray:
+    """The first points of a binary PLY file as daymark writes it."""
+    content = path.read_bytes()
+    body = content[content.index(b"end_header\n") + len(b"end_header\n"):]
+    kind = np.dtype([("at", "<f4", 3), ("rgb", "u1", 3), ("deviation", "<f4")])
+    return np.frombuffer(body, kind, count)["at"].astype(float)
+
+
+def surface_distances(points: np.ndarray, reference: np.ndarray) -> np.ndarray:
+    """Distance of each point from the plane through the eight nearest of the reference."""
+    off = []
+    for part in np.array_split(points, max(1, len(points) // 256)):
+        squared = (part**2).sum(1)[:, None] - 2 * part @ reference.T + (reference**2).sum(1)
+        near = reference[np.argpartition(squared, 8, axis=1)[:, :8]]
+        middle = near.mean(1, keepdims=True)
+        normal = np.linalg.svd(near - middle)[2][:, 2]
+        off.append(np.abs(((part - middle[:, 0]) * normal).sum(1)))
+    return np.concatenate(off)
 
 
 def opencv(paths: list[Path], focal: float) -> tuple[dict[str, np.ndarray], float]:
@@ -136,8 +175,17 @@ def main() -> None:
         if run.returncode != 0:
             sys.exit(f"daymark: exit {run.returncode}: {run.stderr}")
         facts = json.loads(run.stdout)
+        vertices = vertices_of(Path(folder) / "model.ply", facts["points"])
     ours = {view["file"]: np.array(view["position"]) for view in facts["views"] if view["position"]}
     result["daymark"] = {**errors(ours, truth), "reprojection_rms_px": facts["reprojection_rms_px"]}
+    reference = points_of(args.truth)
+    if reference is not None:
+        _, centres, moved = similarity(ours, truth)
+        points = moved(vertices)
+        distance = np.linalg.norm(points[:, None] - centres, axis=2).mean()
+        off = surface_distances(points, reference) / distance
+        result["daymark"]["surface_median_share"] = float(np.median(off))
+        result["daymark"]["surface_p95_share"] = float(np.quantile(off, 0.95))
     if args.json:
         print(json.dumps(result, indent=1))
         return
@@ -146,6 +194,10 @@ def main() -> None:
         row = result[name]
         print(f"{name:10}{row['views']:>7}{row['largest_share']:>14.2%} {row['mean_share']:>11.2%}"
               f"{row['reprojection_rms_px']:>11.2f} px")
+    if "surface_median_share" in result["daymark"]:
+        row = result["daymark"]
+        print(f"daymark's points from the reference's surface: median {row['surface_median_share']:.3%}, "
+              f"95 % {row['surface_p95_share']:.3%} of their distance from the cameras ({len(reference)} reference points)")
 
 
 if __name__ == "__main__":

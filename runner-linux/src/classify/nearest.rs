@@ -85,9 +85,11 @@ impl NearestPoints {
         let (c, d) = halves(right, right_bounds);
         for (child, part) in [a, b, c, d].into_iter().enumerate() {
             let bounds = self::bounds(part);
-            for axis in 0..3 {
-                self.nodes[node].low[axis][child] = bounds.low[axis];
-                self.nodes[node].high[axis][child] = bounds.high[axis];
+            let inner = &mut self.nodes[node];
+            for ((low, high), (l, h)) in
+                inner.low.iter_mut().zip(&mut inner.high).zip(bounds.low.iter().zip(&bounds.high))
+            {
+                (low[child], high[child]) = (*l, *h);
             }
             if !part.is_empty() {
                 self.build(FOUR * node + 1 + child, part, bounds);
@@ -119,8 +121,8 @@ impl NearestPoints {
         let distances = inner.squared(query);
         // The nearest child first; what it leaves of the others is seldom worth sorting.
         let mut first = 0;
-        for child in 1..FOUR {
-            first = if distances[child] < distances[first] { child } else { first };
+        for (child, distance) in distances.iter().enumerate().skip(1) {
+            first = if *distance < distances[first] { child } else { first };
         }
         if distances[first] <= best.squared {
             self.visit(FOUR * node + 1 + first, query, best);
@@ -275,12 +277,12 @@ impl Node {
     #[inline(always)]
     fn squared(&self, query: [f32; 3]) -> [f32; FOUR] {
         let mut sums = [0.0; FOUR];
-        for axis in 0..3 {
-            for child in 0..FOUR {
-                let (below, above) = (self.low[axis][child] - query[axis], query[axis] - self.high[axis][child]);
+        for ((low, high), at) in self.low.iter().zip(&self.high).zip(query) {
+            for ((sum, low), high) in sums.iter_mut().zip(low).zip(high) {
+                let (below, above) = (low - at, at - high);
                 let off = if below > above { below } else { above };
                 let off = if off > 0.0 { off } else { 0.0 };
-                sums[child] += off * off;
+                *sum += off * off;
             }
         }
         sums

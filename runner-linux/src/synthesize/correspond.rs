@@ -167,7 +167,13 @@ fn known(one: &Station, other: &Station, directions: &[Pair], threshold: f64) ->
 }
 
 /// Joins matches to tracks: one feature a view and track; the others are wrong somewhere and go.
-pub fn tracks(features: &[ViewFeatures], pairs: &[PairMatches]) -> (Vec<Track>, RemovedMatches, Explained) {
+pub fn tracks(features: &[ViewFeatures], pairs: &[PairMatches]) -> (Vec<Track>, RemovedMatches) {
+    let (tracks, removed, _) = tracks_explained(features, pairs);
+    (tracks, removed)
+}
+
+/// The same, with what was left out one by one.
+pub fn tracks_explained(features: &[ViewFeatures], pairs: &[PairMatches]) -> (Vec<Track>, RemovedMatches, Explained) {
     let mut removed = RemovedMatches::default();
     let mut explained = Explained::default();
     for pair in pairs {

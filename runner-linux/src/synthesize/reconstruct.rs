@@ -228,7 +228,7 @@ fn correspondences(views: &[View], geometry: Geometry<'_>, corners: &Corners) ->
                 .map(|view| features(view).map_err(|error| NoModel::Picture(format!("{}: {error}", view.name))))
                 .collect::<Result<_, _>>()?;
             let pairs = correspond::pairs(views, &found, geometry);
-            let (tracks, removed, explained) = correspond::tracks(&found, &pairs);
+            let (tracks, removed, explained) = correspond::tracks_explained(&found, &pairs);
             Ok((pairs, tracks, removed, explained))
         }
         Corners::Picked(corners) => {
