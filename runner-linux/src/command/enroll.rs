@@ -23,6 +23,7 @@ use crate::table_file::{OwnedTable, TableFileError, open_table, read_table, repl
 
 /// Arguments of `daymark enroll`.
 #[derive(Debug, clap::Args)]
+#[allow(clippy::struct_excessive_bools, reason = "each is a flag")]
 #[command(after_help = "\
 A manifest names buildings and their pictures, paths relative to the manifest:
 
@@ -125,8 +126,8 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     let pictures = pool.install(|| read_pictures(&plans, profile, &|| progress.inc(1)))?;
     progress.finish_and_clear();
 
-    let mut wishes: Vec<Modelling> = plans.iter().map(|plan| plan.modelling.clone()).collect();
-    wishes.iter_mut().for_each(|wish| wish.unwanted |= args.no_model);
+    let wish = |plan: &Plan| Modelling { unwanted: args.no_model, ..plan.modelling.clone() };
+    let wishes: Vec<Modelling> = plans.iter().map(wish).collect();
     let mut changes: Vec<Change> = plans
         .into_iter()
         .zip(pictures)

@@ -65,7 +65,7 @@ pub fn upright(
     if let Some(fit) = PlaceFit::new(made, &upright.map, places) {
         let along = place_error / fit.spread;
         if upright.scale_error.is_none() {
-            let Similarity { rotation, translation, scale } = upright.map.clone();
+            let Similarity { rotation, translation, scale } = upright.map;
             upright.map = Similarity { scale: scale * fit.scale, rotation, translation: translation * fit.scale };
             upright.scale_error = Some(along);
         }
@@ -164,7 +164,7 @@ fn taller(made: &Reconstruction, map: &Similarity, metres: f64) -> Option<Simila
     heights.sort_unstable_by(f64::total_cmp);
     let at = |share: f64| heights.get((heights.len() as f64 * share) as usize).copied().unwrap_or(0.0);
     let factor = metres / (at(0.99) - at(0.01));
-    let Similarity { scale, rotation, translation } = map.clone();
+    let Similarity { scale, rotation, translation } = *map;
     (factor.is_finite() && factor > 0.0).then(|| Similarity {
         scale: scale * factor,
         rotation,
@@ -183,7 +183,7 @@ fn grounded(made: &Reconstruction, map: &Similarity) -> Similarity {
     };
     let middle = |axis: usize| f64::midpoint(at(axis, 0.01), at(axis, 0.99));
     let origin = Vector3::new(middle(0), middle(1), at(2, 0.01));
-    Similarity { translation: map.translation - origin, ..map.clone() }
+    Similarity { translation: map.translation - origin, ..*map }
 }
 
 /// How the cameras' places in the model fit those that the pictures say.

@@ -79,6 +79,9 @@ impl ObserverFacts {
     }
 
     /// Lines of text.
+    ///
+    /// # Errors
+    /// None: writing to a string cannot fail.
     pub fn write(&self, out: &mut String) -> std::fmt::Result {
         if let Some(fix) = &self.fix {
             let (latitude, longitude) = (fix.latitude_deg, fix.longitude_deg);

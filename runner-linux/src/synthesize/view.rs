@@ -110,7 +110,7 @@ impl Spot {
     #[inline]
     fn of(view: &View, [x, y]: [f64; 2]) -> Option<Self> {
         let (width, height) = (view.gray.width, view.gray.height);
-        if width == 0 || height == 0 || !(x - x == 0.0) || !(y - y == 0.0) {
+        if width == 0 || height == 0 || !x.is_finite() || !y.is_finite() {
             return None;
         }
         // Pictures are shorter than 2^31 pixels; 32 bits are converted faster.

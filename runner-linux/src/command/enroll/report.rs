@@ -253,10 +253,9 @@ fn model_lines(outcome: Option<&ModelOutcome>, stored: Option<&StoredModel<'_>>,
             _ => "--at",
         });
         let give: Vec<&str> = give.collect();
-        text += &format!(
-            "  a frame of it tells the side and the relative distance; for a position give {}\n",
-            give.join(", ")
-        );
+        text += "  a frame of it tells the side and the relative distance; for a position give ";
+        text += &give.join(", ");
+        text += "\n";
     }
     text
 }
