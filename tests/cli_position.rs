@@ -111,6 +111,35 @@ fn a_frame_tells_where_its_camera_stood() {
 }
 
 #[test]
+fn what_was_known_narrows_the_search_and_refuses_a_position_elsewhere() {
+    let town = Town::new();
+    enroll(&town, &[-20.0, 5.0], &PLACE).succeeded();
+    // Another building, 3 km to the north.
+    town.tower(2, "left", "mill.pgm");
+    let mill = ["enroll", "--table", "t.daymark", "--name", "Mill", "--no-lint", "--at", "52.027,13", "mill.pgm"];
+    town.run(&mill).succeeded();
+    let frame = frame(&town, -10.0);
+    let options = |near: &'static str| ["--focal-px", FOCAL, "--near", near];
+    assert_eq!(recognize(&town, &frame, &["--focal-px", FOCAL])["views_compared"], 3);
+    let here = recognize(&town, &frame, &options("52,13,300"));
+    assert_eq!((&here["views_compared"], &here["observer"]["fix"]["method"]), (&2.into(), &"pose".into()));
+    assert!(here["best"]["view"].as_u64().is_some_and(|view| view < 2), "the table's own number");
+    // From there it cannot be seen.
+    let elsewhere = town.run(&["recognize", "--table", "t.daymark", "--json", "--near", "52.027,13,300", &frame]);
+    assert_eq!(elsewhere.code, Some(1));
+    assert_eq!(elsewhere.json()["frames"][0]["views_compared"], 1);
+    // Known to be 150 m off: the building could be seen from there, but not like that.
+    let off = recognize(&town, &frame, &["--focal-px", FOCAL, "--near", "52.00135,13,20", "--reach", "200"]);
+    assert_eq!(off["observer"]["fix"], Value::Null, "{off:#}");
+    assert!(off["observer"]["lacking"][0].as_str().is_some_and(|says| says.contains("--near")), "{off:#}");
+    // The camera looks north.
+    let turned = recognize(&town, &frame, &["--focal-px", FOCAL, "--heading", "90"]);
+    assert!(turned["observer"]["lacking"][0].as_str().is_some_and(|says| says.contains("--heading")), "{turned:#}");
+    let right = recognize(&town, &frame, &["--focal-px", FOCAL, "--heading", "5"]);
+    assert_eq!(right["observer"]["fix"]["method"], "pose");
+}
+
+#[test]
 fn what_is_missing_is_said_and_the_answer_is_as_coarse_as_it_must_be() {
     let town = Town::new();
     enroll(&town, &[-20.0, 5.0], &PLACE).succeeded();

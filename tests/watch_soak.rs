@@ -12,6 +12,7 @@ use daymark::frame::capture::{Capture, Patience};
 use daymark::frame::mock::{Mishap, Mock, Planned};
 use daymark::frame::{Delivery, Fault, Frame, FrameSource, Opener};
 use daymark::lens_source::LensChoice;
+use daymark::near::PriorArgs;
 use daymark::output::record::{Record, TableFacts};
 use daymark::output::target::{Sink, Target};
 use daymark::output::{Form, FormName};
@@ -264,7 +265,7 @@ fn twenty_thousand_frames_through_the_real_recognizer() {
     enroll.args(["enroll", "--name", "Gate", "--no-lint", "--table"]).arg(&table).arg(&picture);
     assert!(enroll.status().expect("it runs").success());
     let table = LiveTable::load(&table).expect("a table");
-    let look = Recognizing::new(table, FalseAnswer::ONE_PERCENT, LensChoice::by_picture(), 100.0);
+    let look = Recognizing::new(table, FalseAnswer::ONE_PERCENT, LensChoice::by_picture(), PriorArgs::default(), 100.0);
     let frames = std::env::var("SOAK_FRAMES").ok().and_then(|frames| frames.parse().ok()).unwrap_or(20_000);
     let told = soak(Box::new(Again(read_gray(&picture).expect("a picture"), frames)), look, &faults(frames, 40));
     assert_eq!(told.frames, frames);

@@ -43,6 +43,7 @@ mod index;
 mod kind;
 mod landmark;
 mod model;
+mod selected;
 mod stream;
 mod view;
 
@@ -60,6 +61,7 @@ pub use model::{
     ModelFacts, ModelFault, ModelPoint, ModelledView, POINT_BYTES, POINTS_LIMIT, PackedPoint, StoredAzimuth,
     StoredModel, TRIANGLE_BYTES, TRIANGLES_LIMIT, UNIT_LIMIT_UM,
 };
+pub use selected::SelectedViews;
 pub use stream::TableStream;
 pub use view::{CORNER_BYTES, LEVELS, SIDE_LIMIT, StoredView, VIEW_HEADER_BYTES, corner_key, on_grid};
 

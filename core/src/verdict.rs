@@ -148,6 +148,22 @@ pub struct Recognition {
     pub corners: usize,
 }
 
+impl Recognition {
+    /// The same with other numbers of views: `view` takes a number to the table's, for a search among
+    /// [selected ones](crate::table::SelectedViews).
+    #[must_use]
+    pub fn renumbered(self, view: impl Fn(u32) -> u32) -> Self {
+        let new = |answer: Answer| Answer { view: view(answer.view), ..answer };
+        let verdict = match self.verdict {
+            Verdict::Known(answer) => Verdict::Known(new(answer)),
+            Verdict::Ambiguous(one, other) => Verdict::Ambiguous(new(one), new(other)),
+            Verdict::Unknown(NoAnswer::NotSure(answer)) => Verdict::Unknown(NoAnswer::NotSure(new(answer))),
+            Verdict::Unknown(why) => Verdict::Unknown(why),
+        };
+        Self { verdict, best: self.best.map(new), runner_up: self.runner_up.map(new), ..self }
+    }
+}
+
 /// The best two landmarks so far; of equal evidence the first stays.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Ranking {

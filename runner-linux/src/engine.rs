@@ -7,7 +7,7 @@ use daymark_core::matcher::ViewMatch;
 use daymark_core::profile::Profile;
 use daymark_core::pyramid::level_bytes;
 use daymark_core::recognizer::Recognizer;
-use daymark_core::table::{StoredView, ViewSource};
+use daymark_core::table::{LandmarkTable, SelectedViews, StoredView, TableError, ViewSource};
 use daymark_core::tone::TonedFrame;
 use daymark_core::verdict::{FalseAnswer, Recognition};
 
@@ -139,6 +139,21 @@ impl Engine {
             AnyRecognizer::Handheld(recognizer) => recognizer.recognize(kernels, frame, table, distances, record, limit),
             AnyRecognizer::Board(recognizer) => recognizer.recognize(kernels, frame, table, distances, record, limit),
         })
+    }
+
+    /// The same among the views with these numbers alone, ascending; all if `None`.
+    ///
+    /// # Errors
+    /// What the table says.
+    pub fn recognize_among(
+        &mut self,
+        table: &mut LandmarkTable<'_>,
+        views: Option<&[u32]>,
+        limit: FalseAnswer,
+    ) -> Result<Recognition, TableError> {
+        let Some(views) = views else { return self.recognize(table, limit) };
+        let recognition = self.recognize(&mut SelectedViews::new(*table, views), limit)?;
+        Ok(recognition.renumbered(|view| views.get(view as usize).copied().unwrap_or(view)))
     }
 
     /// Matches one view with the latest frame and tells what each stored corner said.

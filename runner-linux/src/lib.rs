@@ -26,6 +26,7 @@ pub mod model_file;
 pub mod enroll;
 pub mod table_file;
 pub mod observer;
+pub mod near;
 pub mod dataset;
 mod calendar;
 mod parallel;

@@ -17,6 +17,7 @@ use daymark_core::verdict::Answer;
 
 use crate::engine::Engine;
 use crate::lens_source::{KnownLens, LensSource};
+use crate::near::PriorArgs;
 
 /// Corners of a model that are looked for, at most.
 const POINTS: usize = 1_024;
@@ -40,6 +41,16 @@ pub struct Observer {
     pub fix: Option<Sighted>,
     /// What keeps the fix from being better, each with what to do.
     pub lacking: Vec<String>,
+}
+
+impl Observer {
+    /// Leaves a fix out that contradicts what was known before, and names it.
+    pub fn check(&mut self, prior: &PriorArgs) {
+        if let Some(why) = self.fix.and_then(|sighted| prior.contradiction(&sighted.fix)) {
+            self.fix = None;
+            self.lacking.push(why);
+        }
+    }
 }
 
 /// A fix, and how much of its error is noise.

@@ -12,6 +12,7 @@ use serde::Serialize;
 use super::{CommandError, Outcome};
 use crate::engine::{Engine, FRAME_SIDE};
 use crate::lens_source::{ExifFocal, LensArgs, LensChoice};
+use crate::near::PriorArgs;
 use crate::observer::Locating;
 use crate::picture::{GrayImage, read_gray};
 use crate::report::explain::{Explained, ViewExplanation};
@@ -53,6 +54,8 @@ pub struct Args {
     map: Option<PathBuf>,
     #[command(flatten)]
     lens: LensArgs,
+    #[command(flatten)]
+    prior: PriorArgs,
     /// A building is recognized from this far at most; where its distance is not known, the observer is within it
     #[arg(long, value_name = "METRES", default_value_t = REACH_M, value_parser = reach)]
     reach: f64,
@@ -138,8 +141,14 @@ impl Summary {
 pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     let bytes = read_table(&args.table)?;
     let table = open_table(&args.table, &bytes)?;
-    let mut looking =
-        Looking { args, engine: Engine::new(table.profile()), locating: Locating::new(), lens: args.lens.read()? };
+    let views = args.prior.views(&table, args.reach)?;
+    let mut looking = Looking {
+        args,
+        engine: Engine::new(table.profile()),
+        locating: Locating::new(),
+        lens: args.lens.read()?,
+        views,
+    };
     let mut findings = Vec::new();
     let mut summary = Summary::default();
     let mut unreadable = None;
@@ -191,6 +200,8 @@ struct Looking<'a> {
     engine: Engine,
     locating: Locating,
     lens: LensChoice,
+    /// Those that are compared, if not all.
+    views: Option<Vec<u32>>,
 }
 
 impl Looking<'_> {
@@ -202,7 +213,7 @@ impl Looking<'_> {
         overlay: Option<&Path>,
         map: Option<&Path>,
     ) -> Result<Finding, CommandError> {
-        let Self { args, engine, locating, lens } = self;
+        let Self { args, engine, locating, lens, views } = self;
         let begin = Instant::now();
         let (frame, size) = match read_gray(path) {
             Ok(image) => {
@@ -220,14 +231,16 @@ impl Looking<'_> {
         let read = Instant::now();
         engine.extract(&frame).map_err(|error| format!("{}: {error}", path.display()))?;
         let extracted = Instant::now();
-        let recognition = engine.recognize(&mut table, FalseAnswer::at_most(args.max_false_answer))?;
+        let recognition =
+            engine.recognize_among(&mut table, views.as_deref(), FalseAnswer::at_most(args.max_false_answer))?;
         let matched = Instant::now();
 
         let mut finding = Finding::new(path, &frame, &recognition, &table)?;
         if let Verdict::Known(answer) = &recognition.verdict {
             let exif = lens.asks_picture().then(|| ExifFocal::of_picture(path)).flatten();
             let lens = lens.lens(size[0], size[1], exif.as_ref())?.scaled_to(frame.width as u32, frame.height as u32);
-            let observer = locating.observer(engine, &table, answer, &lens, args.reach)?;
+            let mut observer = locating.observer(engine, &table, answer, &lens, args.reach)?;
+            observer.check(&args.prior);
             finding.observer = Some(ObserverFacts::new(&observer, &lens));
             if let (Some(file), Some(fix)) = (map, observer.fix) {
                 draw_map(file, &table, answer, fix.fix)?;

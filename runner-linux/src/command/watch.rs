@@ -17,6 +17,7 @@ use crate::frame::v4l2::{Camera, Controls, list};
 use crate::frame::{Delivery, Opener};
 use crate::lens_source::LensArgs;
 use crate::log;
+use crate::near::PriorArgs;
 use crate::output::target::{Sink, Target};
 use crate::output::{FormName, Wanted};
 use crate::watch::look::Recognizing;
@@ -94,6 +95,8 @@ pub struct Args {
     speed: f64,
     #[command(flatten)]
     lens: LensArgs,
+    #[command(flatten)]
+    prior: PriorArgs,
 
     /// What to write, and where: text, jsonl, nmea or geojson, then :- (standard output), :FILE, :/dev/ttyUSB0@4800 or
     /// :udp://HOST:PORT. May be given several times [default: text:-]
@@ -185,7 +188,7 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
     let delivery = opener.delivery();
     let outputs = outputs(args, delivery == Delivery::Every)?;
     let limit = FalseAnswer::at_most(args.max_false_answer);
-    let look = Recognizing::new(table, limit, args.lens.read()?, args.reach);
+    let look = Recognizing::new(table, limit, args.lens.read()?, args.prior.clone(), args.reach);
     let run = Run {
         capture: Capture::start(opener, patience)?,
         session: Session::new(look, args.max_false_answer, args.reach, args.speed),

@@ -10,6 +10,7 @@ use super::scene::Scene;
 use super::table::{Landmark, LiveTable};
 use crate::engine::{Engine, FRAME_SIDE};
 use crate::lens_source::LensChoice;
+use crate::near::PriorArgs;
 use crate::observer::{Locating, Sighted};
 use crate::output::record::TableFacts;
 use crate::picture::GrayImage;
@@ -74,7 +75,10 @@ pub struct Recognizing {
     limit: FalseAnswer,
     locating: Locating,
     lens: LensChoice,
+    prior: PriorArgs,
     reach_m: f64,
+    /// Those of the table that are compared, if not all.
+    views: Option<Vec<u32>>,
 }
 
 impl fmt::Debug for Recognizing {
@@ -86,7 +90,8 @@ impl fmt::Debug for Recognizing {
 impl Recognizing {
     /// With a table; a frame alone is known if false with at most `limit`. A landmark is recognized from `reach_m` metres at
     /// most.
-    pub fn new(table: LiveTable, limit: FalseAnswer, lens: LensChoice, reach_m: f64) -> Self {
+    pub fn new(table: LiveTable, limit: FalseAnswer, lens: LensChoice, prior: PriorArgs, reach_m: f64) -> Self {
+        let views = near(&table, &prior, reach_m);
         Self {
             engine: Engine::new(table.table().profile()),
             table,
@@ -94,7 +99,9 @@ impl Recognizing {
             limit,
             locating: Locating::new(),
             lens,
+            prior,
             reach_m,
+            views,
         }
     }
 }
@@ -109,14 +116,19 @@ impl Look for Recognizing {
         self.engine.extract(&frame).map_err(|error| error.to_string())?;
         let extracted = Instant::now();
         let mut table = self.table.table();
-        let recognition = self.engine.recognize(&mut table, self.limit).map_err(|error| error.to_string())?;
+        let recognition = self
+            .engine
+            .recognize_among(&mut table, self.views.as_deref(), self.limit)
+            .map_err(|error| error.to_string())?;
         let matched = Instant::now();
         let observer = match &recognition.verdict {
             Verdict::Known(answer) => {
                 let lens = self.lens.lens(size[0], size[1], None).map_err(|error| error.to_string())?;
                 let lens = lens.scaled_to(frame.width as u32, frame.height as u32);
                 let observer = self.locating.observer(&mut self.engine, &table, answer, &lens, self.reach_m);
-                observer.map_err(|error| error.to_string())?.fix
+                let mut observer = observer.map_err(|error| error.to_string())?;
+                observer.check(&self.prior);
+                observer.fix
             }
             _ => None,
         };
@@ -145,10 +157,16 @@ impl Look for Recognizing {
         if table.table().profile() != self.table.table().profile() {
             self.engine = Engine::new(table.table().profile());
         }
+        self.views = near(&table, &self.prior, self.reach_m);
         self.table = table;
     }
 
     fn forget_scene(&mut self) {
         self.scene.forget();
     }
+}
+
+/// The views that can be seen from where the observer is known to be. The table is verified, so its records can be read.
+fn near(table: &LiveTable, prior: &PriorArgs, reach_m: f64) -> Option<Vec<u32>> {
+    prior.views(&table.table(), reach_m).ok().flatten()
 }
