@@ -107,7 +107,20 @@ fn a_manifest_gives_the_same_bytes_for_any_threads_and_any_order() {
         ["bytes", "file", "format_version", "landmarks", "profile", "table_id", "views"]
     );
     let first = &document["enrolled"][0];
-    assert_eq!(keys(first), ["images", "landmark", "outcome", "position", "position_from", "views_before"]);
+    assert_eq!(
+        keys(first),
+        [
+            "images",
+            "landmark",
+            "missing_for_a_position",
+            "model",
+            "outcome",
+            "position",
+            "position_from",
+            "views_before",
+            "without_model"
+        ]
+    );
     assert_eq!((&first["landmark"], &first["outcome"]), (&json!("Tower 1"), &json!("added")));
     assert_eq!(first["position"], json!({"latitude_deg": 52.0, "longitude_deg": 1.5, "error_m": 20.0}));
     let measures = &first["images"][0]["measures"];
@@ -264,7 +277,7 @@ fn a_table_is_listed_shown_and_verified() {
 
     let document = town.run(&["table", "list", "town.daymark", "--json"]).succeeded().json();
     assert_eq!(keys(&document), ["landmarks", "schema_version", "table"]);
-    assert_eq!(keys(&document["landmarks"][0]), ["bytes", "kind", "landmark", "position", "views"]);
+    assert_eq!(keys(&document["landmarks"][0]), ["bytes", "kind", "landmark", "model_points", "position", "views"]);
     let bytes: u64 =
         document["landmarks"].as_array().expect("all").iter().filter_map(|one| one["bytes"].as_u64()).sum();
     assert_eq!(bytes + 40, town.read("town.daymark").len() as u64, "a header, and nothing that is nobody's");

@@ -128,9 +128,12 @@ struct Finding {
     height_px: usize,
     corners: usize,
     views_compared: u32,
+    /// `tests/cli_position.rs` looks into it.
+    observer: Option<serde_json::Value>,
     times: Option<Times>,
     explanation: Option<Explanation>,
     overlay_file: Option<String>,
+    map_file: Option<String>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -168,6 +171,7 @@ struct Times {
     read_ms: f64,
     features_ms: f64,
     matching_ms: f64,
+    position_ms: f64,
 }
 
 #[derive(Debug, Deserialize)]
@@ -247,6 +251,7 @@ fn a_known_building_is_named_with_its_place_and_how_sure_that_is() {
     assert!(finding.probability_false_answer.is_some_and(|p| p <= 0.01), "{finding:?}");
     assert_eq!((finding.width_px, finding.height_px, finding.views_compared), (640, 480, 6));
     assert!(finding.corners > 100 && finding.reason.is_none() && finding.overlay_file.is_none());
+    assert!(finding.map_file.is_none() && finding.observer.is_some_and(|observer| observer["pose"].is_null()));
     let times = finding.times.as_ref().expect("times");
     assert!(times.read_ms > 0.0 && times.features_ms > 0.0 && times.matching_ms > 0.0);
 

@@ -79,8 +79,8 @@ fn nmea_is_read_back_as_an_estimate_and_never_as_a_satellite_fix() {
     assert!(close(rmc.lat, 52.5) && close(rmc.lon, -13.25), "{rmc:?}");
     assert!(sentences[1].contains(",A,") && sentences[1].contains(",E*"), "{}", sentences[1]);
     let ParseResult::GST(gst) = parse_str(sentences[2]).expect("GST") else { panic!("{}", sentences[2]) };
-    // (20 m of the building's place + 180 m of reach) / 2, along each axis.
-    assert_eq!((gst.lat_sd, gst.long_sd), (Some(100.0), Some(100.0)), "{gst:?}");
+    // Half of 180 m of reach and half of the 20 m of the building's place, in squares, along each axis.
+    assert_eq!((gst.lat_sd, gst.long_sd), (Some(90.6), Some(90.6)), "{gst:?}");
     assert!(sentences[3].starts_with("$INTLL,00,5230.000000,N,01315.000000,W,Gate  old ,,T,*"), "{}", sentences[3]);
     let ParseResult::GGA(gone) = parse_str(sentences[8]).expect("GGA") else { panic!("{}", sentences[8]) };
     assert_eq!((gone.fix_type, gone.latitude), (Some(nmea::sentences::FixType::Invalid), None));

@@ -106,7 +106,7 @@ fn signals_are_heeded() {
     run.signal(Signal::USR1);
     let (counters, _) = run.until("counters");
     assert!(counters["resident_bytes"].as_u64().is_some_and(|bytes| bytes > 1_000_000), "{counters}");
-    assert!(counters["stages"].as_array().is_some_and(|stages| stages.len() == 7), "{counters}");
+    assert!(counters["stages"].as_array().is_some_and(|stages| stages.len() == 8), "{counters}");
     run.signal(Signal::HUP);
     assert_eq!(run.until("table").0["accepted"], true);
     std::thread::sleep(Duration::from_millis(50));
