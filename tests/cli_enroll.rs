@@ -286,7 +286,7 @@ fn a_table_is_listed_shown_and_verified() {
     let document = town.run(&["table", "show", "town.daymark", "Mill", "--json"]).succeeded().json();
     assert_eq!(
         keys(&document),
-        ["bytes", "kind", "landmark", "position", "schema_version", "table", "view_list", "views"]
+        ["bytes", "kind", "landmark", "model_points", "position", "schema_version", "table", "view_list", "views"]
     );
     let view = &document["view_list"][0];
     assert_eq!(keys(view), ["bytes", "corners", "corners_per_level", "height_px", "view", "width_px"]);

@@ -251,7 +251,7 @@ fn a_known_building_is_named_with_its_place_and_how_sure_that_is() {
     assert!(finding.probability_false_answer.is_some_and(|p| p <= 0.01), "{finding:?}");
     assert_eq!((finding.width_px, finding.height_px, finding.views_compared), (640, 480, 6));
     assert!(finding.corners > 100 && finding.reason.is_none() && finding.overlay_file.is_none());
-    assert!(finding.map_file.is_none() && finding.observer.is_some_and(|observer| observer["pose"].is_null()));
+    assert!(finding.map_file.is_none() && finding.observer.as_ref().is_some_and(|observer| observer["pose"].is_null()));
     let times = finding.times.as_ref().expect("times");
     assert!(times.read_ms > 0.0 && times.features_ms > 0.0 && times.matching_ms > 0.0);
 
