@@ -254,6 +254,7 @@ fn a_known_building_is_named_with_its_place_and_how_sure_that_is() {
     assert!(finding.map_file.is_none() && finding.observer.as_ref().is_some_and(|observer| observer["pose"].is_null()));
     let times = finding.times.as_ref().expect("times");
     assert!(times.read_ms > 0.0 && times.features_ms > 0.0 && times.matching_ms > 0.0);
+    assert!(times.position_ms > 0.0 && times.position_ms < 1_000.0);
 
     let best = finding.best.as_ref().expect("a best");
     assert_eq!((best.landmark.as_str(), best.kind.as_str()), ("Bell Tower", "tower"));
