@@ -70,10 +70,8 @@ impl PriorArgs {
         for number in 0..table.landmark_count() {
             let landmark = table.landmark(number)?;
             let in_reach = landmark.position.is_none_or(|place| {
-                let [latitude_deg, longitude_deg] =
-                    [place.latitude_e7, place.longitude_e7].map(|e7| f64::from(e7) / 1e7);
-                let [east, north, _] = frame.local_from_wgs84(Wgs84 { latitude_deg, longitude_deg, altitude_m: 0.0 });
-                libm::hypot(east, north) <= radius_m + reach_m + f64::from(place.error_dm) / 10.0
+                let [east, north, _] = frame.local_from_wgs84(place.wgs84());
+                libm::hypot(east, north) <= radius_m + reach_m + place.error_m()
             });
             if in_reach {
                 views.extend(landmark.views);

@@ -11,7 +11,7 @@ use daymark_core::camera::direction::Direction;
 use daymark_core::camera::locate::{FrameCorner, Located, Locator, ModelCorner};
 use daymark_core::camera::pose::{NoPose, PointInView, Pose, PoseSettings, PoseSolver};
 use daymark_core::fix::site::reach_of_size;
-use daymark_core::fix::{Fix, Site, Wgs84};
+use daymark_core::fix::{Fix, Site};
 use daymark_core::table::{GeoPosition, Kind, LandmarkTable, StoredModel, TableError};
 use daymark_core::verdict::Answer;
 
@@ -342,13 +342,12 @@ fn length([x, y, z]: [f64; 3]) -> f64 {
 
 /// The model's place on Earth. Heights count from its foot, which the table does not know above the sea.
 pub fn site(at: GeoPosition, model: Option<&StoredModel<'_>>) -> Site {
-    let [latitude_deg, longitude_deg] = [at.latitude_e7, at.longitude_e7].map(|e7| f64::from(e7) / 1e7);
     let azimuth = model.and_then(|model| model.facts().azimuth);
     Site {
-        position: Wgs84 { latitude_deg, longitude_deg, altitude_m: 0.0 },
+        position: at.wgs84(),
         azimuth_deg: azimuth.map_or(0.0, |azimuth| f64::from(azimuth.centidegrees) / 100.0),
         // "Within" is taken as two deviations of each coordinate.
-        deviation_m: f64::from(at.error_dm) / 10.0 / 2.0,
+        deviation_m: at.error_m() / 2.0,
         azimuth_deviation_deg: azimuth.map_or(180.0, |azimuth| f64::from(azimuth.deviation) / 100.0),
     }
 }

@@ -1,6 +1,7 @@
 //! A landmark's record: name, kind and position.
 
 use super::{EncodeError, Kind, RecordFault};
+use crate::fix::Wgs84;
 use core::ops::Range;
 use serde::{Deserialize, Serialize};
 
@@ -34,6 +35,19 @@ pub struct GeoPosition {
     pub longitude_e7: i32,
     /// The true place lies within this many decimetres; at most [`ERROR_LIMIT_DM`].
     pub error_dm: u32,
+}
+
+impl GeoPosition {
+    /// The place in degrees. Its height is unknown and stands as 0.
+    pub fn wgs84(&self) -> Wgs84 {
+        let [latitude_deg, longitude_deg] = [self.latitude_e7, self.longitude_e7].map(|e7| f64::from(e7) / 1e7);
+        Wgs84 { latitude_deg, longitude_deg, altitude_m: 0.0 }
+    }
+
+    /// The true place lies within this many metres.
+    pub fn error_m(&self) -> f64 {
+        f64::from(self.error_dm) / 10.0
+    }
 }
 
 /// A landmark as a table stores it.

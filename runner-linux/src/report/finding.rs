@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use daymark_core::evidence::EVIDENCE_UNIT;
-use daymark_core::table::{LandmarkTable, TableError};
+use daymark_core::table::{GeoPosition, LandmarkTable, TableError};
 use daymark_core::verdict::{Answer, NoAnswer, Recognition, Verdict};
 use serde::Serialize;
 
@@ -58,6 +58,13 @@ pub struct Position {
     pub longitude_deg: f64,
     /// The true place lies within this.
     pub error_m: f64,
+}
+
+impl From<GeoPosition> for Position {
+    fn from(at: GeoPosition) -> Self {
+        let place = at.wgs84();
+        Self { latitude_deg: place.latitude_deg, longitude_deg: place.longitude_deg, error_m: at.error_m() }
+    }
 }
 
 /// A landmark with its best view.
@@ -137,11 +144,7 @@ impl Candidate {
         Ok(Self {
             landmark: landmark.name.to_owned(),
             kind: landmark.kind.name(),
-            position: landmark.position.map(|at| Position {
-                latitude_deg: f64::from(at.latitude_e7) / 1e7,
-                longitude_deg: f64::from(at.longitude_e7) / 1e7,
-                error_m: f64::from(at.error_dm) / 10.0,
-            }),
+            position: landmark.position.map(Position::from),
             view: answer.view,
             evidence_bits: bits(answer.matched.evidence),
             probability_false_answer: answer.false_answer.probability(),

@@ -79,11 +79,7 @@ impl LiveTable {
         Some(Landmark {
             name: landmark.name.to_owned(),
             kind: landmark.kind.name(),
-            position: landmark.position.map(|at| Position {
-                latitude_deg: f64::from(at.latitude_e7) / 1e7,
-                longitude_deg: f64::from(at.longitude_e7) / 1e7,
-                error_m: f64::from(at.error_dm) / 10.0,
-            }),
+            position: landmark.position.map(Position::from),
         })
     }
 

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use daymark_core::fix::{LocalFrame, Wgs84};
+use daymark_core::fix::LocalFrame;
 use daymark_core::table::GeoPosition;
 use rayon::prelude::*;
 
@@ -112,7 +112,7 @@ fn one(table: &OwnedTable, change: &Change, wish: &Modelling) -> Result<Made, Co
         small: &picture.gray,
         stored: (&landmark.views[picture.place], picture.place as u16),
         place: frame.zip(picture.camera).map(|(frame, at)| {
-            let [east, north, _] = frame.local_from_wgs84(wgs84(at));
+            let [east, north, _] = frame.local_from_wgs84(at.wgs84());
             [east, north]
         }),
     });
@@ -124,14 +124,9 @@ fn one(table: &OwnedTable, change: &Change, wish: &Modelling) -> Result<Made, Co
     Ok(Some(model(shots.collect(), &Known { cameras, scale, facing: wish.facing })))
 }
 
-fn wgs84(at: GeoPosition) -> Wgs84 {
-    let [latitude_deg, longitude_deg] = [at.latitude_e7, at.longitude_e7].map(|e7| f64::from(e7) / 1e7);
-    Wgs84 { latitude_deg, longitude_deg, altitude_m: 0.0 }
-}
-
 /// The east-north-up frame at the first picture that says where it was taken.
 fn place_frame(change: &Change) -> Option<LocalFrame> {
-    change.pictures.iter().find_map(|picture| picture.camera).map(|at| LocalFrame::new(wgs84(at)))
+    change.pictures.iter().find_map(|picture| picture.camera).map(|at| LocalFrame::new(at.wgs84()))
 }
 
 /// Where the model's origin is, by the pictures' places.
@@ -139,6 +134,6 @@ fn origin_position(change: &Change, [east, north]: [f64; 2]) -> Option<GeoPositi
     let at = place_frame(change)?.wgs84_from_local([east, north, 0.0]);
     let receivers = change.pictures.iter().filter_map(|picture| picture.camera);
     // What a single picture's place allows for the way to the building is known now.
-    let error = receivers.map(|at| f64::from(at.error_dm) / 10.0 - CAMERA_ERROR_METRES).fold(10.0, f64::max);
+    let error = receivers.map(|at| at.error_m() - CAMERA_ERROR_METRES).fold(10.0, f64::max);
     position(at.latitude_deg, at.longitude_deg, error).ok()
 }

@@ -125,9 +125,5 @@ impl ViewFacts {
 }
 
 pub(in crate::command) fn position(at: GeoPosition) -> Position {
-    Position {
-        latitude_deg: f64::from(at.latitude_e7) / 1e7,
-        longitude_deg: f64::from(at.longitude_e7) / 1e7,
-        error_m: f64::from(at.error_dm) / 10.0,
-    }
+    at.into()
 }
