@@ -146,7 +146,7 @@ fn read(path: &Path, colour: bool) -> Result<(GrayImage, Vec<u8>), PictureError>
     }
     let mut file = BufReader::new(File::open(path).map_err(io)?);
     if !file.fill_buf().map_err(io)?.starts_with(&[0xFF, 0xD8]) {
-        return decode(file, colour).map_err(fail);
+        return decode(&mut file, colour).map_err(fail);
     }
     // A JPEG is looked through for its end first; other files are decoded as they are read.
     let mut bytes = Vec::new();
@@ -154,10 +154,15 @@ fn read(path: &Path, colour: bool) -> Result<(GrayImage, Vec<u8>), PictureError>
     if is_cut_jpeg(&bytes) {
         return Err(fail(Reason::Damaged("its end is missing".to_owned())));
     }
-    decode(Cursor::new(bytes), colour).map_err(fail)
+    decode(&mut Cursor::new(bytes), colour).map_err(fail)
 }
 
-fn decode(mut file: impl BufRead + Seek, colour: bool) -> Result<(GrayImage, Vec<u8>), Reason> {
+/// A file, or one in memory: the decoders are the same.
+trait PictureFile: BufRead + Seek {}
+
+impl<T: BufRead + Seek> PictureFile for T {}
+
+fn decode(file: &mut dyn PictureFile, colour: bool) -> Result<(GrayImage, Vec<u8>), Reason> {
     if file.fill_buf().map_err(|error| Reason::Io(error.to_string()))?.is_empty() {
         return Err(Reason::Empty);
     }

@@ -1,12 +1,12 @@
 //! Tests against bases: every comparison, the decisions, and what they are when the true base is not there.
 
-use rayon::prelude::*;
 use serde::Serialize;
 
 use super::align::{Align, base_from_test};
 use super::cloud::Cloud;
 use super::decide::{Answer, Decision, Intensity, Rule, decide};
 use super::error::{Comparison, compare};
+use crate::parallel;
 
 /// How tests and bases are compared and decided.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -37,7 +37,7 @@ pub fn size(cloud: &Cloud) -> f64 {
 /// A test compared with every base.
 pub fn compare_with_each(test: &Cloud, bases: &[Cloud], method: &Method) -> Vec<Comparison> {
     let reach = method.reach_share * size(test);
-    bases.par_iter().map(|base| compare(test, base, base_from_test(test, base, method.align, None), reach)).collect()
+    parallel::map(bases, |base| compare(test, base, base_from_test(test, base, method.align, None), reach))
 }
 
 /// One test in numbers: a row of the thesis' Table 1 with its decision.

@@ -1,6 +1,6 @@
 //! The nearest point of a cloud: a balanced k-d tree with its points in the leaves.
 
-use rayon::prelude::*;
+use crate::parallel;
 
 /// Points of a leaf, at most.
 const LEAF: usize = 8;
@@ -151,7 +151,7 @@ impl NearestPoints {
         let chunks: Vec<_> = if rayon::current_num_threads() == 1 {
             order.chunks(CHUNK).map(search).collect()
         } else {
-            order.par_chunks(CHUNK).map(search).collect()
+            parallel::map(&order.chunks(CHUNK).collect::<Vec<_>>(), |chunk| search(chunk))
         };
         let mut found = vec![None; queries.len()];
         for (number, nearest) in chunks.into_iter().flatten() {

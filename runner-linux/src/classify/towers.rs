@@ -7,10 +7,10 @@ use daymark_core::mesh::SubdivisionLevel;
 use daymark_fixtures::random::SplitMix64;
 use daymark_fixtures::{Camera, Lens as FixtureLens, Light, Scene, Sensor, Site, Tower, render, view};
 use nalgebra::{Matrix3, Vector3};
-use rayon::prelude::*;
 
 use super::cloud::Cloud;
 use crate::camera_file::lens::{Lens, Pose};
+use crate::parallel;
 use crate::picture::GrayImage;
 use crate::synthesize::model::Model;
 use crate::synthesize::triangulate::Rules;
@@ -46,32 +46,26 @@ impl TowerViews {
     /// Renders a tower from these angles; `around` if the last view's neighbour is the first.
     pub fn new(tower: &Tower, angles: &[f64], conditions: &Conditions, around: bool) -> Self {
         let scene = Scene::alone(tower.clone(), conditions.seed).lit(conditions.light);
-        let shots: Vec<_> = angles
-            .par_iter()
-            .enumerate()
-            .map(|(number, &angle)| {
-                let mut stand = view::stand(tower, angle);
-                stand.distance *= conditions.farther;
-                let camera = Camera::before(Site::ORIGIN, stand, FixtureLens::VGA);
-                let sensor = Sensor::daylight(conditions.seed * 64 + number as u64);
-                let frame = render(&scene, &camera, &sensor);
-                let corners = frame.truth.visible(0).map(|corner| (corner.number, [corner.image.x, corner.image.y]));
-                let lens = Lens::of_focal(camera.width, camera.height, camera.focal);
-                let [right, down, forward] = camera.view_from_world.map(|axis| [axis.x, axis.y, axis.z]);
-                let at = camera.position;
-                let pose = Pose {
-                    view_from_model: Matrix3::from_rows(
-                        &[right, down, forward].map(|row| Vector3::from(row).transpose()),
-                    ),
-                    position: Vector3::new(at.x, at.y, at.z),
-                };
-                let corners: Vec<_> = corners.collect();
-                let gray = GrayImage { pixels: frame.gray, width: frame.width as usize, height: frame.height as usize };
-                let view =
-                    View { name: format!("tower {} at {angle} degrees", tower.number), gray, rgb: frame.rgb, lens };
-                (view, Station::new(&lens, pose), corners)
-            })
-            .collect();
+        let shots = parallel::numbers(angles.len(), |number| {
+            let angle = angles[number];
+            let mut stand = view::stand(tower, angle);
+            stand.distance *= conditions.farther;
+            let camera = Camera::before(Site::ORIGIN, stand, FixtureLens::VGA);
+            let sensor = Sensor::daylight(conditions.seed * 64 + number as u64);
+            let frame = render(&scene, &camera, &sensor);
+            let corners = frame.truth.visible(0).map(|corner| (corner.number, [corner.image.x, corner.image.y]));
+            let lens = Lens::of_focal(camera.width, camera.height, camera.focal);
+            let [right, down, forward] = camera.view_from_world.map(|axis| [axis.x, axis.y, axis.z]);
+            let at = camera.position;
+            let pose = Pose {
+                view_from_model: Matrix3::from_rows(&[right, down, forward].map(|row| Vector3::from(row).transpose())),
+                position: Vector3::new(at.x, at.y, at.z),
+            };
+            let corners: Vec<_> = corners.collect();
+            let gray = GrayImage { pixels: frame.gray, width: frame.width as usize, height: frame.height as usize };
+            let view = View { name: format!("tower {} at {angle} degrees", tower.number), gray, rgb: frame.rgb, lens };
+            (view, Station::new(&lens, pose), corners)
+        });
         let mut made = Self { views: Vec::new(), stations: Vec::new(), corners: Vec::new(), around };
         for (view, station, corners) in shots {
             made.views.push(view);

@@ -13,12 +13,12 @@ use daymark_core::table::{Kind, LandmarkTable};
 use daymark_core::tone::TonedFrame;
 use daymark_core::verdict::FalseAnswer;
 use daymark_fixtures::{Lens, Tower, Trial, View};
-use rayon::prelude::*;
 use serde::Serialize;
 
 use super::{CommandError, Outcome};
 use crate::engine::{Engine, FRAME_SIDE, STRIP};
 use crate::enroll;
+use crate::parallel;
 use crate::picture::{GrayImage, read_gray};
 use crate::simd::Processor;
 use crate::table_file::{LandmarkEntry, OwnedTable, open_table, read_table};
@@ -167,7 +167,7 @@ fn made_table() -> Result<Vec<u8>, CommandError> {
         let [left, _] = View::enrollment(tower, Lens::VGA);
         enroll::view(&drawn(&left), profile)
     };
-    let views = Tower::eight().par_iter().map(enroll).collect::<Result<Vec<_>, _>>()?;
+    let views = parallel::try_map(&Tower::eight(), enroll)?;
     let landmark = |(number, view)| LandmarkEntry {
         name: format!("Tower {number}"),
         kind: Kind::Tower,

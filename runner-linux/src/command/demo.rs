@@ -13,12 +13,14 @@ use daymark_core::table::LandmarkTable;
 use daymark_core::verdict::FalseAnswer;
 use daymark_fixtures::{Lens, Tower, View};
 use image::ExtendedColorType::Rgb8;
-use rayon::prelude::*;
+use image::ImageEncoder;
+use image::codecs::png::PngEncoder;
 
 use super::evaluate::measure::workers;
 use super::{CommandError, Outcome};
 use crate::engine::{Engine, FRAME_SIDE};
 use crate::enroll;
+use crate::parallel;
 use crate::picture::{GrayImage, read_gray};
 use crate::report::explain::ViewExplanation;
 use crate::report::finding::{Finding, Times};
@@ -103,8 +105,11 @@ fn write(path: &Path, bytes: &[u8]) -> Result<(), CommandError> {
 }
 
 fn write_png(path: &Path, rgb: &[u8], lens: Lens) -> Result<(), CommandError> {
-    image::save_buffer(path, rgb, lens.width, lens.height, Rgb8)
-        .map_err(|error| refused("write", path, &io::Error::other(error)).into())
+    let mut png = Vec::new();
+    PngEncoder::new(&mut png)
+        .write_image(rgb, lens.width, lens.height, Rgb8)
+        .map_err(|error| refused("write", path, &io::Error::other(error)))?;
+    write(path, &png)
 }
 
 fn enroll_towers(out: &Path, towers: &[Tower; 8], lens: Lens) -> Result<Vec<Enrolled>, CommandError> {
@@ -118,7 +123,7 @@ fn enroll_towers(out: &Path, towers: &[Tower; 8], lens: Lens) -> Result<Vec<Enro
         let view = enroll::view(&picture, Profile::Handheld)?;
         Ok(Enrolled { building: tower.name.clone(), file, picture, view })
     };
-    views.par_iter().map(enroll).collect()
+    parallel::try_map(&views, enroll)
 }
 
 fn save_table(path: &Path, towers: &[Tower; 8], enrolled: &[Enrolled]) -> Result<(), CommandError> {
@@ -139,7 +144,7 @@ fn frame_file(shot: &Shot) -> String {
 
 fn draw_frames(out: &Path, shots: &[Shot], lens: Lens) -> Result<(), CommandError> {
     let draw = |shot: &Shot| write_png(&out.join(frame_file(shot)), &scene::render(shot, lens), lens);
-    shots.par_iter().try_for_each(draw)
+    parallel::try_map(shots, draw).map(|_| ())
 }
 
 fn recognize_all(

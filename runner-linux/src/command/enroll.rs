@@ -9,15 +9,15 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 use daymark_core::profile::Profile;
 use daymark_core::table::{Header, Kind, LandmarkTable};
 use indicatif::{ProgressBar, ProgressStyle};
-use rayon::prelude::*;
 
 use super::{CommandError, Outcome};
 use crate::engine::{Engine, STACK_BYTES};
-use crate::enroll::lint::{LintError, ViewLint, lint};
+use crate::enroll::lint::{ViewLint, lint};
 use crate::enroll::manifest;
 use crate::enroll::plan::{Plan, check_name, read_pictures};
 use crate::enroll::position::{GIVEN_ERROR_METRES, parse_degrees, position};
 use crate::enroll::update::{Change, Enrolled, apply};
+use crate::parallel;
 use crate::table_file::{OwnedTable, TableFileError, open_table, read_table, replace_file};
 
 /// Arguments of `daymark enroll`.
@@ -188,8 +188,7 @@ fn lint_all(table: LandmarkTable<'_>, changes: &[Change]) -> Result<Vec<Vec<Opti
         progress.inc(1);
         measured
     };
-    let results: Result<Vec<Option<ViewLint>>, LintError> =
-        work.par_iter().map_init(|| Engine::new(table.profile()), measure).collect();
+    let results = parallel::try_map_with(&work, || Engine::new(table.profile()), measure);
     progress.finish_and_clear();
     let mut lints = results?.into_iter();
     Ok(changes.iter().map(|change| lints.by_ref().take(change.pictures.len()).collect()).collect())

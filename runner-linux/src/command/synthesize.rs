@@ -11,7 +11,8 @@ use indicatif::ProgressBar;
 
 use super::{CommandError, Outcome};
 use crate::model_file::Format;
-use crate::picture::{read_colour, scaled_colours};
+use crate::parallel;
+use crate::picture::{PictureError, read_colour, scaled_colours};
 use crate::synthesize::frame::{Scale, moved, upright};
 use crate::synthesize::reconstruct::{Cameras, Corners, NoModel, Shape, reconstruct};
 use crate::synthesize::report::facts;
@@ -149,21 +150,16 @@ pub fn run(args: &Args) -> Result<Outcome, CommandError> {
 type Inputs = (Vec<View>, Cameras, Corners);
 
 fn inputs(args: &Args) -> Result<Inputs, CommandError> {
-    use rayon::prelude::*;
     let side = args.side as usize;
-    let pictures: Vec<_> = args
-        .images
-        .par_iter()
-        .map(|path| {
-            let (gray, rgb) = read_colour(path)?;
-            let size = [gray.width, gray.height];
-            if gray.width.max(gray.height) <= side {
-                return Ok((gray, rgb, size));
-            }
-            let rgb = scaled_colours(&rgb, gray.width, gray.height, side);
-            Ok((gray.scaled_to(side), rgb, size))
-        })
-        .collect::<Result<_, crate::picture::PictureError>>()?;
+    let pictures = parallel::try_map(&args.images, |path| {
+        let (gray, rgb) = read_colour(path)?;
+        let size = [gray.width, gray.height];
+        if gray.width.max(gray.height) <= side {
+            return Ok((gray, rgb, size));
+        }
+        let rgb = scaled_colours(&rgb, gray.width, gray.height, side);
+        Ok::<_, PictureError>((gray.scaled_to(side), rgb, size))
+    })?;
     let sizes: Vec<[u32; 2]> = pictures.iter().map(|picture| picture.2.map(|length| length as u32)).collect();
     let (lenses, known) = cameras::cameras(&args.images, &sizes, &args.cameras, args.focal_px, args.fixed_lens)?;
     let corners = if args.corners.is_empty() {

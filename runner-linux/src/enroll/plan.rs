@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 
 use daymark_core::profile::Profile;
 use daymark_core::table::{GeoPosition, Kind, LANDMARK_BYTES, encode_landmark};
-use rayon::prelude::*;
 
 use super::{TooFewCorners, position, view};
 use crate::engine::FRAME_SIDE;
+use crate::parallel;
 use crate::picture::{GrayImage, PictureError, Reason, read_gray};
 use crate::table_file::ViewEntry;
 
@@ -74,14 +74,11 @@ pub fn read_pictures(
     };
     PicturesError::of(all.iter().filter_map(missing).collect(), all.len())?;
 
-    let results: Vec<Result<Picture, String>> = all
-        .par_iter()
-        .map(|(plan, path)| {
-            let picture = read_picture(path, profile).map_err(|says| format!("{}{says}", plan.origin));
-            done();
-            picture
-        })
-        .collect();
+    let results = parallel::map(&all, |(plan, path)| {
+        let picture = read_picture(path, profile).map_err(|says| format!("{}{says}", plan.origin));
+        done();
+        picture
+    });
     let (mut pictures, mut failures) = (Vec::new(), Vec::new());
     for result in results {
         match result {

@@ -1,12 +1,12 @@
 //! Which features of which views are the same point: look-alikes, checked by epipolar geometry, joined to tracks.
 
-use rayon::prelude::*;
 use serde::Serialize;
 
 use super::epipolar::{Estimate, Pair, RelativePose, relative_pose};
 use super::factorize::affine_inliers;
 use super::features::{ViewFeatures, guided_matches, mutual_matches};
 use super::view::{Station, Track, View};
+use crate::parallel;
 
 /// Distance from the epipolar line within which a match is right, pixels of the working size.
 pub const INLIER_PX: f64 = 1.5;
@@ -68,7 +68,7 @@ const AFFINE_INLIER_PX: f64 = 4.0;
 /// Matches of every pair of views, checked by `geometry`. The seed of each pair's samples depends on the pair only.
 pub fn pairs(views: &[View], features: &[ViewFeatures], geometry: Geometry<'_>) -> Vec<PairMatches> {
     let all: Vec<[usize; 2]> = (0..views.len()).flat_map(|a| (a + 1..views.len()).map(move |b| [a, b])).collect();
-    all.into_par_iter().map(|pair| matched(pair, views, features, geometry)).collect()
+    parallel::map(&all, |&pair| matched(pair, views, features, geometry))
 }
 
 fn matched([a, b]: [usize; 2], views: &[View], features: &[ViewFeatures], geometry: Geometry<'_>) -> PairMatches {

@@ -4,9 +4,9 @@ use std::fmt;
 
 use daymark_core::mesh::{MeshCounts, MeshError, SubdivisionLevel, TriangleMesh, storage_words};
 use nalgebra::Vector3;
-use rayon::prelude::*;
 
 use super::view::{Station, Surface, View};
+use crate::parallel;
 
 /// Points of a dense cloud, at most: with triangles 1.2 GB ([`BYTES_PER_POINT`]).
 pub const MAX_POINTS: u64 = 24_000_000;
@@ -137,19 +137,15 @@ pub fn dense(
         let triangle = point.triangle.or(triangle_of_vertex[usize::from(point.corners[0])]);
         views_of_points.push(triangle.and_then(|triangle| shown.get(triangle as usize).copied().flatten()));
     }
-    let coloured: Vec<(f32, [u8; 3])> = positions
-        .par_chunks(CHUNK)
-        .zip(views_of_points.par_chunks(CHUNK))
-        .flat_map_iter(|(positions, shown)| {
-            positions.iter().zip(shown).map(|(position, view)| {
-                view.and_then(|view| {
-                    colour(views.get(view as usize)?, stations.get(view as usize)?.as_ref()?, position)
-                })
+    let chunks: Vec<_> = positions.chunks(CHUNK).zip(views_of_points.chunks(CHUNK)).collect();
+    let coloured = parallel::map(&chunks, |(positions, shown)| {
+        let colour = |(position, view): (&[f32; 3], &Option<u32>)| {
+            view.and_then(|view| colour(views.get(view as usize)?, stations.get(view as usize)?.as_ref()?, position))
                 .unwrap_or((f32::NAN, [128; 3]))
-            })
-        })
-        .collect();
-    let (gray, rgb) = coloured.into_iter().unzip();
+        };
+        positions.iter().zip(*shown).map(colour).collect::<Vec<(f32, [u8; 3])>>()
+    });
+    let (gray, rgb) = coloured.into_iter().flatten().unzip();
     Ok(DenseCloud { level, positions, deviations, gray, rgb, triangles })
 }
 

@@ -8,12 +8,12 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::Vector3;
-use rayon::prelude::*;
 use serde::Serialize;
 use spade::handles::FixedVertexHandle;
 use spade::{DelaunayTriangulation, HasPosition, Point2, Triangulation};
 
 use super::view::{Station, Surface, Vertex};
+use crate::parallel;
 
 /// What was dropped, and why.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
@@ -96,7 +96,7 @@ pub fn surface(
     spacing_px: f64,
 ) -> (Surface, Dropped) {
     let candidates: Vec<(Vec<[u32; 3]>, Dropped)> =
-        pairs.par_iter().map(|&pair| pair_triangles(&vertices, stations, pair, spacing_px)).collect();
+        parallel::map(pairs, |&pair| pair_triangles(&vertices, stations, pair, spacing_px));
     let mut dropped = Dropped::default();
     let mut triangles: Vec<[u32; 3]> = Vec::new();
     // Directed edges: each belongs to one triangle, so that the surface is one that core's mesh accepts.

@@ -14,7 +14,7 @@ use super::motion::{NoMotion, motion};
 use super::triangulate::Rules;
 use super::view::{Station, Track, View};
 use crate::camera_file::lens::Pose;
-use rayon::prelude::*;
+use crate::parallel;
 
 /// Where correspondences come from.
 #[derive(Debug, Clone)]
@@ -214,10 +214,9 @@ type Found = (Vec<PairMatches>, Vec<Track>, RemovedMatches);
 fn correspondences(views: &[View], geometry: Geometry<'_>, corners: &Corners) -> Result<Found, NoModel> {
     match corners {
         Corners::Automatic => {
-            let found: Vec<ViewFeatures> = views
-                .par_iter()
-                .map(|view| features(view).map_err(|error| NoModel::Picture(format!("{}: {error}", view.name))))
-                .collect::<Result<_, _>>()?;
+            let found: Vec<ViewFeatures> = parallel::try_map(views, |view| {
+                features(view).map_err(|error| NoModel::Picture(format!("{}: {error}", view.name)))
+            })?;
             let pairs = correspond::pairs(views, &found, geometry);
             let (tracks, removed) = correspond::tracks(&found, &pairs);
             Ok((pairs, tracks, removed))
@@ -243,24 +242,22 @@ fn correspondences(views: &[View], geometry: Geometry<'_>, corners: &Corners) ->
 /// Pairs of views by numbered corners; numbers of "features" are numbers of tracks.
 fn picked_pairs(views: &[View], tracks: &[Track], known: bool) -> Vec<PairMatches> {
     let all: Vec<[usize; 2]> = (0..views.len()).flat_map(|a| (a + 1..views.len()).map(move |b| [a, b])).collect();
-    all.into_par_iter()
-        .map(|[a, b]| {
-            let shared: Vec<(u32, [[f64; 2]; 2])> = (0..)
-                .zip(tracks)
-                .filter_map(|(number, track)| Some((number, [track.seen_by(a)?, track.seen_by(b)?])))
-                .collect();
-            let (left, right) = (&views[a].lens, &views[b].lens);
-            let directions: Vec<_> = shared
-                .iter()
-                .map(|(_, [p, q])| [left.normalized_from_ideal(*p), right.normalized_from_ideal(*q)])
-                .collect();
-            let threshold = 2.0 * 2.0 * correspond::INLIER_PX / (left.focal[0] + right.focal[0]);
-            let estimate = if known { None } else { relative_pose(&directions, threshold, (a * 65_536 + b) as u64) };
-            let matches = shared.iter().map(|(number, _)| [*number; 2]).collect();
-            let agreeing = estimate.as_ref().map_or(shared.len(), |estimate| estimate.inliers.len());
-            PairMatches { views: [a, b], alike: shared.len(), agreeing, matches, estimate }
-        })
-        .collect()
+    parallel::map(&all, |&[a, b]| {
+        let shared: Vec<(u32, [[f64; 2]; 2])> = (0..)
+            .zip(tracks)
+            .filter_map(|(number, track)| Some((number, [track.seen_by(a)?, track.seen_by(b)?])))
+            .collect();
+        let (left, right) = (&views[a].lens, &views[b].lens);
+        let directions: Vec<_> = shared
+            .iter()
+            .map(|(_, [p, q])| [left.normalized_from_ideal(*p), right.normalized_from_ideal(*q)])
+            .collect();
+        let threshold = 2.0 * 2.0 * correspond::INLIER_PX / (left.focal[0] + right.focal[0]);
+        let estimate = if known { None } else { relative_pose(&directions, threshold, (a * 65_536 + b) as u64) };
+        let matches = shared.iter().map(|(number, _)| [*number; 2]).collect();
+        let agreeing = estimate.as_ref().map_or(shared.len(), |estimate| estimate.inliers.len());
+        PairMatches { views: [a, b], alike: shared.len(), agreeing, matches, estimate }
+    })
 }
 
 /// Pairs of views whose surfaces are joined, those that share the most first: each view with the view that it shares the

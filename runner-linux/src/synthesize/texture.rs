@@ -1,9 +1,8 @@
 //! Which view shows each triangle best, and the intensities that it gives.
 
-use rayon::prelude::*;
-
 use super::render::DepthBuffer;
 use super::view::{Station, Surface, View};
+use crate::parallel;
 
 /// Longer side of the buffer in which occlusion is tested, in pixels.
 const BUFFER_SIDE: f64 = 480.0;
@@ -25,20 +24,16 @@ const PROBES: [[f64; 3]; 7] = [
 /// A triangle that no view shows whole takes the largest of the views that see its three corners; `None` if none does.
 pub fn best_views(surface: &Surface, views: &[View], stations: &[Option<Station>]) -> Vec<Option<u32>> {
     let positions: Vec<[f64; 3]> = surface.vertices.iter().map(|vertex| vertex.position.into()).collect();
-    let scores: Vec<Vec<[f64; 2]>> = views
-        .par_iter()
-        .zip(stations)
-        .enumerate()
-        .map(|(number, (view, station))| {
-            let Some(station) = station else { return vec![[0.0; 2]; surface.triangles.len()] };
-            let longer = view.gray.width.max(view.gray.height).max(1) as f64;
-            let scale = (BUFFER_SIDE / longer).min(1.0);
-            let size = [view.gray.width, view.gray.height].map(|side| ((side as f64 * scale) as usize).max(1));
-            let buffer = DepthBuffer::new(&station.pinhole, size, scale, &positions, &surface.triangles);
-            let score = |triangle: &[u32; 3]| score(surface, view, station, number, &buffer, scale, *triangle);
-            surface.triangles.iter().map(score).collect()
-        })
-        .collect();
+    let shown: Vec<(&View, &Option<Station>)> = views.iter().zip(stations).collect();
+    let scores = parallel::numbers(shown.len(), |number| {
+        let (view, Some(station)) = shown[number] else { return vec![[0.0; 2]; surface.triangles.len()] };
+        let longer = view.gray.width.max(view.gray.height).max(1) as f64;
+        let scale = (BUFFER_SIDE / longer).min(1.0);
+        let size = [view.gray.width, view.gray.height].map(|side| ((side as f64 * scale) as usize).max(1));
+        let buffer = DepthBuffer::new(&station.pinhole, size, scale, &positions, &surface.triangles);
+        let score = |triangle: &[u32; 3]| score(surface, view, station, number, &buffer, scale, *triangle);
+        surface.triangles.iter().map(score).collect::<Vec<[f64; 2]>>()
+    });
     (0..surface.triangles.len())
         .map(|triangle| {
             let best = |kind: usize| {

@@ -2,10 +2,10 @@
 
 use daymark_core::camera::triangulate::{NoPoint, Sighting, triangulate};
 use nalgebra::{Matrix3, Vector3};
-use rayon::prelude::*;
 use serde::Serialize;
 
 use super::view::{Station, Track, Vertex};
+use crate::parallel;
 
 /// When a point is refused.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -46,7 +46,7 @@ impl Refusals {
 
 /// The points of all tracks that `stations` (one a view; `None` for views without a place) see well enough.
 pub fn points(tracks: &[Track], stations: &[Option<Station>], rules: &Rules) -> (Vec<Vertex>, Refusals) {
-    let results: Vec<Result<Vertex, Refusals>> = tracks.par_iter().map(|track| point(track, stations, rules)).collect();
+    let results = parallel::map(tracks, |track| point(track, stations, rules));
     let mut refused = Refusals::default();
     let mut vertices = Vec::with_capacity(results.len());
     for result in results {

@@ -8,13 +8,13 @@ use daymark_core::profile::Profile;
 use daymark_core::table::{Kind, LandmarkTable, TableError};
 use daymark_core::verdict::{Answer, FalseAnswer, NoAnswer, Recognition, Verdict};
 use indicatif::{ProgressBar, ProgressStyle};
-use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 
 use super::super::CommandError;
 use crate::dataset::Dataset;
 use crate::engine::{Engine, FRAME_SIDE, STACK_BYTES};
 use crate::enroll;
+use crate::parallel;
 use crate::picture::{GrayImage, read_gray};
 use crate::report::evaluation::{GalleryView, Guess, Judged, Outcome, Times, percentile};
 use crate::table_file::{LandmarkEntry, OwnedTable, ViewEntry};
@@ -83,16 +83,13 @@ pub(super) fn enroll(dataset: &Dataset, profile: Profile) -> Result<Gallery, Com
         .flat_map(|building| building.gallery.iter().map(|file| (building.name.as_str(), file.as_str())))
         .collect();
     let bar = progress(pictures.len(), "enrolling");
-    let enrolled = pictures
-        .par_iter()
-        .map(|(_, file)| {
-            let image = read(&dataset.folder, file)?;
-            let begin = Instant::now();
-            let view = enroll::view(&image, profile).ok();
-            bar.inc(1);
-            Ok((view, begin.elapsed().as_secs_f64() * 1e3))
-        })
-        .collect::<Result<Vec<(Option<ViewEntry>, f64)>, CommandError>>()?;
+    let enrolled = parallel::try_map(&pictures, |(_, file)| {
+        let image = read(&dataset.folder, file)?;
+        let begin = Instant::now();
+        let view = enroll::view(&image, profile).ok();
+        bar.inc(1);
+        Ok::<_, CommandError>((view, begin.elapsed().as_secs_f64() * 1e3))
+    })?;
     bar.finish_and_clear();
 
     // The table sorts its landmarks by the bytes of their names and keeps the order of their views.
@@ -185,10 +182,7 @@ pub(super) fn recognize(
         let ms = |from: Instant, to: Instant| (to - from).as_secs_f64() * 1e3;
         Ok((judged, ms(begin, extracted), ms(extracted, matched)))
     };
-    let judged = tasks
-        .par_iter()
-        .map_init(|| Engine::new(table.profile()), judge)
-        .collect::<Result<Vec<(Judged, f64, f64)>, CommandError>>()?;
+    let judged = parallel::try_map_with(&tasks, || Engine::new(table.profile()), judge)?;
     bar.finish_and_clear();
     let mut run = Run { frames: Vec::new(), features_ms: Vec::new(), matching_ms: Vec::new() };
     for (frame, features, matching) in judged {

@@ -17,10 +17,10 @@ use daymark_core::point::{ImagePoint, SUBPIXEL};
 use daymark_fixtures::Tower;
 use daymark_fixtures::distort::{Distortion, NumberedPoint};
 use daymark_fixtures::pick::{PICKS, REFERENCE_ANGLE};
-use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::command::{CommandError, Outcome};
+use crate::parallel;
 
 /// Version of the form of `--json`.
 const SCHEMA_VERSION: u32 = 1;
@@ -229,19 +229,16 @@ fn measure(
     cases: u64,
     make: impl Fn(u64) -> (Vec<NumberedPoint>, Vec<NumberedPoint>) + Sync,
 ) -> Result<Tallies, GeometryError> {
-    let tallies = (0..cases).into_par_iter().map_init(Matcher::new, |matcher, case| {
-        let (first, second) = make(case);
+    let tallies = parallel::try_numbers(cases as usize, Matcher::new, |matcher, case| {
+        let (first, second) = make(case as u64);
         let mut tallies = [Tally::default(); 4];
         for (tally, method) in tallies.iter_mut().zip(Method::EACH) {
             *tally = matcher.run(method, &first, &second)?;
         }
         Ok(tallies)
-    });
-    let sum = tallies.try_reduce(
-        || [Tally::default(); 4],
-        |one, two| Ok(std::array::from_fn(|method| one[method].add(two[method]))),
-    )?;
-    Ok(Tallies(sum))
+    })?;
+    let add = |one: [Tally; 4], two: [Tally; 4]| std::array::from_fn(|method| one[method].add(two[method]));
+    Ok(Tallies(tallies.into_iter().fold([Tally::default(); 4], add)))
 }
 
 /// The memory that one thread matches with.

@@ -14,7 +14,6 @@ use std::path::PathBuf;
 use clap::ValueEnum;
 use daymark_fixtures::Tower;
 use indicatif::{ProgressBar, ProgressStyle};
-use rayon::prelude::*;
 use serde::Serialize;
 
 use self::pair::{Method, Pair, TOLERANCE_PX, Tally};
@@ -24,6 +23,7 @@ use super::super::{CommandError, Outcome};
 use crate::correspond::MOST_CORNERS;
 use crate::correspond::automatic::CORNERS_PER_IMAGE;
 use crate::correspond::matching::Matcher;
+use crate::parallel;
 
 /// Version of the form of `--json`.
 const SCHEMA_VERSION: u32 = 1;
@@ -184,36 +184,33 @@ fn of_towers(args: &Args) -> Result<Vec<Line>, CommandError> {
     let towers = Tower::eight();
     let bar = progress(towers.len() * settings.len(), "towers");
     // Each tower on its own, added up in their order: the same figures for any number of threads.
-    let measured: Result<Vec<Vec<Tally>>, CommandError> = towers
-        .par_iter()
-        .map(|tower| {
-            let mut matcher = Matcher::default();
-            let count = usize::from(args.corners_per_image);
-            let mut tallies = Vec::with_capacity(settings.len());
-            let mut last: Option<(f64, i32, towers::Seen, towers::Seen)> = None;
-            for (_, _, disturbance, cases) in &settings {
-                let Disturbance { angle, gray_levels, .. } = *disturbance;
-                let views = match last.take() {
-                    Some(views) if (views.0, views.1) == (angle, gray_levels) => views,
-                    _ => (
-                        angle,
-                        gray_levels,
-                        see(tower, 0.0, gray_levels, 0, count)?,
-                        see(tower, angle, gray_levels, 1, count)?,
-                    ),
-                };
-                let mut tally = Tally::default();
-                for case in 0..*cases {
-                    let seed = case * 100 + u64::from(tower.number);
-                    tally.add(&towers::pair(&views.2, &views.3, *disturbance, seed).tally(&mut matcher)?);
-                }
-                tallies.push(tally);
-                last = Some(views);
-                bar.inc(1);
+    let measured: Result<Vec<Vec<Tally>>, CommandError> = parallel::try_map(&towers, |tower| {
+        let mut matcher = Matcher::default();
+        let count = usize::from(args.corners_per_image);
+        let mut tallies = Vec::with_capacity(settings.len());
+        let mut last: Option<(f64, i32, towers::Seen, towers::Seen)> = None;
+        for (_, _, disturbance, cases) in &settings {
+            let Disturbance { angle, gray_levels, .. } = *disturbance;
+            let views = match last.take() {
+                Some(views) if (views.0, views.1) == (angle, gray_levels) => views,
+                _ => (
+                    angle,
+                    gray_levels,
+                    see(tower, 0.0, gray_levels, 0, count)?,
+                    see(tower, angle, gray_levels, 1, count)?,
+                ),
+            };
+            let mut tally = Tally::default();
+            for case in 0..*cases {
+                let seed = case * 100 + u64::from(tower.number);
+                tally.add(&towers::pair(&views.2, &views.3, *disturbance, seed).tally(&mut matcher)?);
             }
-            Ok(tallies)
-        })
-        .collect();
+            tallies.push(tally);
+            last = Some(views);
+            bar.inc(1);
+        }
+        Ok(tallies)
+    });
     bar.finish_and_clear();
     let mut lines: Vec<Line> =
         settings.into_iter().map(|(group, setting, ..)| Line { group, setting, tally: Tally::default() }).collect();
@@ -243,10 +240,9 @@ fn of_photos(args: &Args) -> Result<Vec<Line>, CommandError> {
 
 /// The sum over pairs, in their order.
 fn together(pairs: &[Pair]) -> Result<Tally, CommandError> {
-    let tallies: Result<Vec<Tally>, _> =
-        pairs.par_iter().map_init(Matcher::default, |matcher, pair| pair.tally(matcher)).collect();
+    let tallies = parallel::try_map_with(pairs, Matcher::default, |matcher, pair| pair.tally(matcher))?;
     let mut sum = Tally::default();
-    tallies?.iter().for_each(|tally| sum.add(tally));
+    tallies.iter().for_each(|tally| sum.add(tally));
     Ok(sum)
 }
 

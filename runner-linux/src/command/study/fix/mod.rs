@@ -12,12 +12,12 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use daymark_fixtures::Scene;
-use rayon::prelude::*;
 use serde::Serialize;
 
 use self::score::{Case, Figures, Track, Wrong};
 use self::walk::{Spoil, Stop, stop};
 use crate::command::{CommandError, Outcome};
+use crate::parallel;
 
 /// Version of the form of `--json`.
 const SCHEMA_VERSION: u32 = 1;
@@ -103,7 +103,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CommandError> {
     let mut map = args.map.as_deref().map(Drawing::create).transpose()?;
     let scene = Scene::town();
     let count = args.poses as usize;
-    let stops: Vec<Stop> = (0..count).into_par_iter().map(|number| stop(&scene, number, count, args.seed)).collect();
+    let stops: Vec<Stop> = parallel::numbers(count, |number| stop(&scene, number, count, args.seed));
     let asked = Spoil { noise_px: args.noise_px, wrong: args.wrong, most: args.corners as usize };
     let cases = score::cases(&stops, asked, args.seed);
     let line = |noise_px: f64, wrong: f64| {

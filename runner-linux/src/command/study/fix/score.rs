@@ -6,10 +6,10 @@ use daymark_core::fix::track::{Track as Filter, Update};
 use daymark_core::fix::{Fix, Site};
 use daymark_fixtures::distort::Distortion;
 use daymark_fixtures::{Corner, Scene};
-use rayon::prelude::*;
 use serde::Serialize;
 
 use super::walk::{LENS, Spoil, Stop, by_chance, by_place, correspondences, site, town};
+use crate::parallel;
 
 /// Correspondences of all towers of a frame.
 const POINTS: usize = 512;
@@ -99,19 +99,21 @@ fn random(seed: u64, purpose: u64, number: usize) -> Distortion {
 
 /// Every pose with the tower that is looked at.
 pub(super) fn cases(stops: &[Stop], spoil: Spoil, seed: u64) -> Vec<Case> {
-    let case = |(number, stop): (usize, &Stop)| {
+    let case = |number| {
+        let stop: &Stop = &stops[number];
         let points = correspondences(stop, stop.tower, spoil, &mut random(seed, 1, number));
         let pose = solve(&points, spoil.noise_px).ok();
         let answer = pose.map(|pose| Answer::of(site(stop.tower).fix(&pose), pose.rival.is_some(), stop));
         Case { share: stop.share, answer }
     };
-    stops.par_iter().enumerate().map(case).collect()
+    parallel::numbers(stops.len(), case)
 }
 
 /// Every pose with all towers in the frame, solved as one.
 pub(super) fn together(stops: &[Stop], spoil: Spoil, seed: u64) -> Vec<Case> {
     let frame = town();
-    let case = |(number, stop): (usize, &Stop)| {
+    let case = |number| {
+        let stop: &Stop = &stops[number];
         let mut random = random(seed, 2, number);
         let mut points = Vec::new();
         for tower in 0..8 {
@@ -126,7 +128,7 @@ pub(super) fn together(stops: &[Stop], spoil: Spoil, seed: u64) -> Vec<Case> {
         let answer = pose.map(|pose| Answer::of(town.fix(&pose), pose.rival.is_some(), stop));
         Case { share: stop.share, answer }
     };
-    stops.par_iter().enumerate().map(case).collect()
+    parallel::numbers(stops.len(), case)
 }
 
 fn turn(one: f64, two: f64) -> f64 {
@@ -229,7 +231,8 @@ impl Track {
 pub(super) fn wrong_buildings(stops: &[Stop], scene: &Scene, spoil: Spoil, seed: u64) -> Vec<Wrong> {
     let corners: Vec<Vec<Corner>> = scene.towers.iter().map(daymark_fixtures::Tower::corners).collect();
     let same_shape = |one: usize, two: usize| scene.towers[one].solids == scene.towers[two].solids;
-    let attempt = |(number, stop): (usize, &Stop)| {
+    let attempt = |number| {
+        let stop: &Stop = &stops[number];
         let mut random = random(seed, 3, number);
         let mut counts = [[0_usize; 2]; 3];
         for other in (0..corners.len()).filter(|other| *other != stop.tower) {
@@ -243,11 +246,10 @@ pub(super) fn wrong_buildings(stops: &[Stop], scene: &Scene, spoil: Spoil, seed:
         }
         counts
     };
-    let none = || [[0; 2]; 3];
     let add = |one: [[usize; 2]; 3], two: [[usize; 2]; 3]| {
         std::array::from_fn(|kind| std::array::from_fn(|column| one[kind][column] + two[kind][column]))
     };
-    let counts = stops.par_iter().enumerate().map(attempt).reduce(none, add);
+    let counts = parallel::numbers(stops.len(), attempt).into_iter().fold([[0; 2]; 3], add);
     let titles = ["corners matched by chance", "corners matched by place", "by place, same shape (towers 2 and 5)"];
     let wrong = |(matched, [attempts, fixes]): (&'static str, [usize; 2])| Wrong { matched, attempts, fixes };
     titles.into_iter().zip(counts).map(wrong).collect()
