@@ -61,7 +61,7 @@ pub struct CornerEvidence {
 /// of the frame's `n` corners elsewhere are nearer than `d`. The rank devalues windows that match everywhere. The
 /// table of `model.rs` turns `a` and `b` into bits. A query corner supports one stored corner only. The sum over each
 /// of 6 x 6 cells of the view saturates, so that one sign or tree cannot carry the answer.
-pub fn weigh<K: Kernels, const QUERY: usize, const CORNERS: usize>(
+pub fn weigh<K: Kernels + ?Sized, const QUERY: usize, const CORNERS: usize>(
     kernels: &K,
     pairing: &Pairing<'_, QUERY>,
     refined: &Refined,
@@ -108,7 +108,7 @@ pub fn weigh<K: Kernels, const QUERY: usize, const CORNERS: usize>(
 }
 
 /// Corners of the frame that are nearer in signature and lie elsewhere: farther than the radius from the match.
-fn rank<K: Kernels, const QUERY: usize>(
+fn rank<K: Kernels + ?Sized, const QUERY: usize>(
     kernels: &K,
     pairing: &Pairing<'_, QUERY>,
     row: &[u8],

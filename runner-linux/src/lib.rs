@@ -13,8 +13,7 @@
 
 pub mod picture;
 mod cut_jpeg;
-pub mod simd;
-pub mod engine;
+pub use daymark_engine::{engine, simd};
 pub mod camera_file;
 pub mod synthesize;
 pub mod classify;

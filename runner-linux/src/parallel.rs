@@ -26,7 +26,10 @@ pub(crate) fn numbers<R: Send>(count: usize, work: impl Fn(usize) -> R + Sync) -
 ///
 /// # Errors
 /// That of the first item that fails; what comes after it may be left out.
-pub(crate) fn try_map<T: Sync, R: Send, E: Send>(items: &[T], work: impl Fn(&T) -> Result<R, E> + Sync) -> Result<Vec<R>, E> {
+pub(crate) fn try_map<T: Sync, R: Send, E: Send>(
+    items: &[T],
+    work: impl Fn(&T) -> Result<R, E> + Sync,
+) -> Result<Vec<R>, E> {
     try_numbers(items.len(), || (), |(), number| work(&items[number]))
 }
 

@@ -5,33 +5,26 @@ use std::io::{self, Write};
 use std::path::PathBuf;
 use std::time::Instant;
 
-use daymark_core::corner::{CELLS, CornerDetector, slots};
-use daymark_core::extract::{Extractor, FeatureSet, FrontEnd};
+use daymark_core::extract::FrontEnd;
 use daymark_core::profile::Profile;
-use daymark_core::pyramid::level_bytes;
 use daymark_core::table::{Kind, LandmarkTable};
-use daymark_core::tone::TonedFrame;
 use daymark_core::verdict::FalseAnswer;
+use daymark_engine::stages::Stages;
 use daymark_fixtures::{Lens, Tower, Trial, View};
 use serde::Serialize;
 
 use super::{CommandError, Outcome};
-use crate::engine::{Engine, FRAME_SIDE, STRIP};
+use crate::engine::{Engine, FRAME_SIDE};
 use crate::enroll;
 use crate::parallel;
 use crate::picture::{GrayImage, read_gray};
 use crate::simd::Processor;
 use crate::table_file::{LandmarkEntry, OwnedTable, open_table, read_table};
-use crate::with_kernels;
 
 /// Version of the form of `--json`.
 const SCHEMA_VERSION: u32 = 1;
-/// Corners that the stages of the front end look for.
-const CORNERS: usize = 600;
-const FRONT_END: FrontEnd = FrontEnd { features: CORNERS as u16, cell_share_tenths: 12 };
-/// A cell's share of the first level if it gives all the corners.
-const FIRST_LEVEL_SHARE: usize = (CORNERS * FRONT_END.cell_share_tenths as usize).div_ceil(10 * CELLS);
-const SLOTS: usize = slots(FIRST_LEVEL_SHARE);
+/// What the stages of the front end look for.
+const FRONT_END: FrontEnd = FrontEnd { features: 600, cell_share_tenths: 12 };
 /// Views of the table that is made if none is given.
 const VIEWS: usize = 100;
 /// Rounds before the first that counts.
@@ -180,28 +173,15 @@ fn made_table() -> Result<Vec<u8>, CommandError> {
 
 fn measure(args: &Args, image: &GrayImage, mut table: LandmarkTable<'_>) -> Result<Document, CommandError> {
     let processor = Processor::detect();
-    let mut stages = Stages::new(image);
+    let mut toned = Vec::new();
+    let mut stages = Stages::new(processor, image, FRONT_END, &mut toned)?;
     let mut counts = CornerFacts { first_level: 0, all_levels: 0, matched: 0 };
-    let (first, all, features) = with_kernels!(processor, kernels => {
-        let mut toned = vec![0; image.pixels.len()];
-        let toned = TonedFrame::write(kernels, image.view()?, &mut toned)?;
-        let Stages { first_level, extractor, features, levels, toned: own_toned } = &mut stages;
-        let first = Times::measure(args.runs, 1e-3, || {
-            counts.first_level = 0;
-            first_level.detect(kernels, toned.view(), CORNERS, FIRST_LEVEL_SHARE, |_| counts.first_level += 1);
-            Ok::<(), CommandError>(())
-        })?;
-        let all = Times::measure(args.runs, 1e-3, || {
-            counts.all_levels = extractor.count_corners(kernels, toned, FRONT_END, levels)?.iter().sum();
-            Ok::<(), CommandError>(())
-        })?;
-        let features = Times::measure(args.runs, 1e-3, || {
-            let toned = TonedFrame::write(kernels, image.view()?, own_toned)?;
-            extractor.extract(kernels, toned, FRONT_END, levels, features)?;
-            Ok::<(), CommandError>(())
-        })?;
-        (first, all, features)
-    });
+    let first = Times::measure(args.runs, 1e-3, || {
+        counts.first_level = stages.corners_of_first_level();
+        Ok::<(), CommandError>(())
+    })?;
+    let all = Times::measure(args.runs, 1e-3, || stages.corners().map(|count| counts.all_levels = count))?;
+    let features = Times::measure(args.runs, 1e-3, || stages.features().map(|_| ()))?;
     let mut engine = Engine::with_processor(table.profile(), processor);
     engine.extract(image)?;
     counts.matched = engine.features().len();
@@ -223,27 +203,6 @@ fn measure(args: &Args, image: &GrayImage, mut table: LandmarkTable<'_>) -> Resu
         features_ms: features,
         view_match_us: view_match,
     })
-}
-
-/// Memory of the front end, allocated once.
-struct Stages {
-    first_level: Box<CornerDetector<STRIP, SLOTS>>,
-    extractor: Box<Extractor<STRIP, SLOTS>>,
-    features: Box<FeatureSet<CORNERS>>,
-    levels: Vec<u8>,
-    toned: Vec<u8>,
-}
-
-impl Stages {
-    fn new(image: &GrayImage) -> Self {
-        Self {
-            first_level: Box::default(),
-            extractor: Box::default(),
-            features: Box::default(),
-            levels: vec![0; level_bytes(image.width, image.height)],
-            toned: vec![0; image.pixels.len()],
-        }
-    }
 }
 
 fn as_text(document: &Document) -> String {

@@ -1,15 +1,13 @@
 //! Corners of a picture, found as `daymark recognize` finds them.
 
-use daymark_core::extract::{Extractor, FeatureSet, FrontEnd};
+use daymark_core::extract::FrontEnd;
 use daymark_core::image::FrameError;
 use daymark_core::point::ImagePoint;
-use daymark_core::pyramid::level_bytes;
-use daymark_core::tone::TonedFrame;
+use daymark_engine::reader::FrameReader;
 
 use super::MOST_CORNERS;
 use crate::picture::GrayImage;
 use crate::simd::Processor;
-use crate::with_kernels;
 
 /// Corners of a picture if nothing else is asked for: of 100, 150 and 200 the number that led to most right matches on
 /// neighbouring photographs (`daymark study repeatability --scenes photos --corners-per-image N`).
@@ -30,17 +28,9 @@ const FRONT_END: FrontEnd = FrontEnd { features: MOST_FEATURES as u16, cell_shar
 /// [`FrameError`] for a picture beyond core's limits.
 pub fn corners(image: &GrayImage, count: usize) -> Result<Vec<ImagePoint>, FrameError> {
     let count = count.min(MOST_CORNERS);
-    let mut extractor: Box<Extractor<256, { FRONT_END.slots() }>> = Box::default();
-    let mut features: Box<FeatureSet<MOST_FEATURES>> = Box::default();
-    let mut scratch = vec![0; level_bytes(image.width, image.height)];
-    let mut toned = vec![0; image.width * image.height];
-    let view = image.view()?;
+    let mut reader = FrameReader::new(Processor::detect());
     let front_end = FrontEnd { features: (count * 10_000 / FINEST_SHARE + 1) as u16, ..FRONT_END };
-    with_kernels!(Processor::detect(), kernels => {
-        let toned = TonedFrame::write(kernels, view, &mut toned)?;
-        extractor.extract(kernels, toned, front_end, &mut scratch, &mut features)
-    })?;
-    let features = features.view();
+    let features = reader.read(image, front_end)?;
     let finest = features.iter().filter(|feature| feature.level == 0).take(count);
     let mut corners: Vec<ImagePoint> = finest.map(|feature| feature.position).collect();
     corners.sort_unstable();

@@ -11,9 +11,8 @@ pub mod lint;
 pub mod manifest;
 pub mod plan;
 pub mod position;
-pub mod select;
-pub mod simulate;
 pub mod update;
 mod view;
 
+pub use daymark_engine::{select, simulate};
 pub use view::{TooFewCorners, view};

@@ -10,14 +10,13 @@ use crate::engine::selection;
 use crate::picture::GrayImage;
 use crate::simd::Processor;
 use crate::table_file::ViewEntry;
-use crate::with_kernels;
 
 /// The view that a table of this profile stores of a picture, which is shrunk already ([`crate::engine::FRAME_SIDE`]).
 ///
 /// # Errors
 /// [`TooFewCorners`] for a picture in which nothing could be found again.
 pub fn view(image: &GrayImage, profile: Profile) -> Result<ViewEntry, TooFewCorners> {
-    let features = with_kernels!(Processor::detect(), kernels => select_corners(kernels, image, selection(profile)));
+    let features = select_corners(Processor::detect(), image, selection(profile));
     let size = |length: usize| u16::try_from(length).unwrap_or(u16::MAX);
     if features.len() < LEAST_CORNERS {
         return Err(TooFewCorners { found: features.len(), needed: LEAST_CORNERS });

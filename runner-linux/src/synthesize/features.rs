@@ -1,20 +1,17 @@
 //! Corners and signatures of a view, many more than recognition takes, and which of two views' look alike.
 
-use daymark_core::extract::{Extractor, FeatureSet, FrontEnd};
+use daymark_core::extract::FrontEnd;
 use daymark_core::feature::Signature;
 use daymark_core::image::FrameError;
-use daymark_core::kernel::{Kernels, places};
-use daymark_core::pyramid::level_bytes;
-use daymark_core::tone::TonedFrame;
+use daymark_core::kernel::places;
+use daymark_engine::reader::{FrameReader, MOST_FEATURES};
 
 use super::view::View;
 use crate::simd::Processor;
-use crate::with_kernels;
 
 /// Features of a view, at most.
-pub const FEATURES: usize = 4_000;
+pub const FEATURES: usize = MOST_FEATURES;
 const FRONT_END: FrontEnd = FrontEnd { features: FEATURES as u16, cell_share_tenths: 20 };
-const STRIP: usize = 256;
 /// Bits by which matching signatures may differ, of 128.
 const MAX_BITS: u32 = 40;
 /// The best match must have at most this share of the next one's bits, in hundredths.
@@ -44,17 +41,10 @@ pub struct ViewFeatures {
 /// # Errors
 /// [`FrameError`] for a picture beyond core's limits.
 pub fn features(view: &View) -> Result<ViewFeatures, FrameError> {
-    let mut extractor: Box<Extractor<STRIP, { FRONT_END.slots() }>> = Box::default();
-    let mut set: Box<FeatureSet<FEATURES>> = Box::default();
-    let mut levels = vec![0; level_bytes(view.gray.width, view.gray.height)];
-    let mut toned = vec![0; view.gray.width * view.gray.height];
-    let frame = view.gray.view()?;
-    with_kernels!(Processor::detect(), kernels => {
-        let toned = TonedFrame::write(kernels, frame, &mut toned)?;
-        extractor.extract(kernels, toned, FRONT_END, &mut levels, &mut set)
-    })?;
+    let mut reader = FrameReader::new(Processor::detect());
+    let features = reader.read(&view.gray, FRONT_END)?;
     let mut found = ViewFeatures::default();
-    for feature in set.view().iter() {
+    for feature in features.iter() {
         let at = feature.position.to_pixels().map(f64::from);
         found.points.push(at);
         found.ideal.push(view.lens.ideal_from_picture(at).unwrap_or([f64::NAN; 2]));
@@ -80,19 +70,19 @@ pub fn mutual_matches(first: &ViewFeatures, second: &ViewFeatures) -> Vec<[u32; 
 /// The feature nearest to a signature, if it is near and no other one elsewhere comes close.
 fn nearest(signature: Signature, to: &ViewFeatures, row: &mut [u8]) -> Option<usize> {
     let row = row.get_mut(..to.signatures.len())?;
-    with_kernels!(Processor::detect(), kernels => {
-        kernels.distances(signature, &to.signatures, row);
-        let least = row.iter().copied().min()?;
-        if u32::from(least) > MAX_BITS {
-            return None;
-        }
-        let best = row.iter().position(|&distance| distance == least)?;
-        let limit = (u32::from(least) * 100 / RATIO_PERCENT) as u8;
-        let mut marks = vec![0; row.len().div_ceil(64)];
-        kernels.marks_at_most(row, limit, &mut marks);
-        let rival = places(&marks).any(|other| elsewhere(to.points[other], to.points[best]));
-        (!rival).then_some(best)
-    })
+    let processor = Processor::detect();
+    let kernels = processor.kernels();
+    kernels.distances(signature, &to.signatures, row);
+    let least = row.iter().copied().min()?;
+    if u32::from(least) > MAX_BITS {
+        return None;
+    }
+    let best = row.iter().position(|&distance| distance == least)?;
+    let limit = (u32::from(least) * 100 / RATIO_PERCENT) as u8;
+    let mut marks = vec![0; row.len().div_ceil(64)];
+    kernels.marks_at_most(row, limit, &mut marks);
+    let rival = places(&marks).any(|other| elsewhere(to.points[other], to.points[best]));
+    (!rival).then_some(best)
 }
 
 fn elsewhere(a: [f64; 2], b: [f64; 2]) -> bool {
@@ -110,17 +100,17 @@ pub fn guided_matches(
     for &[a, b] in known {
         (left[a as usize], right[b as usize]) = (true, true);
     }
+    let processor = Processor::detect();
+    let kernels = processor.kernels();
     let mut found: Vec<(u8, [u32; 2])> = Vec::new();
     let mut row = vec![0; second.points.len()];
     let mut marks = vec![0; row.len().div_ceil(64)];
     for (a, signature) in first.signatures.iter().enumerate().filter(|(a, _)| !left[*a]) {
         let mut candidates: Vec<(u8, usize)> = Vec::new();
-        with_kernels!(Processor::detect(), kernels => {
-            kernels.distances(*signature, &second.signatures, &mut row);
-            kernels.marks_at_most(&row, MAX_RIVAL_BITS, &mut marks);
-            let allowed = places(&marks).filter(|&b| !right[b] && near(first.ideal[a], second.ideal[b]));
-            candidates.extend(allowed.map(|b| (row[b], b)));
-        });
+        kernels.distances(*signature, &second.signatures, &mut row);
+        kernels.marks_at_most(&row, MAX_RIVAL_BITS, &mut marks);
+        let allowed = places(&marks).filter(|&b| !right[b] && near(first.ideal[a], second.ideal[b]));
+        candidates.extend(allowed.map(|b| (row[b], b)));
         candidates.sort_unstable();
         let Some(&(least, best)) = candidates.first().filter(|(least, _)| u32::from(*least) <= MAX_GUIDED_BITS) else {
             continue;

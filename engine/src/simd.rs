@@ -9,7 +9,7 @@
 mod by_hand;
 
 use daymark_core::feature::Signature;
-use daymark_core::kernel::{self, BoxSums, Kernels, LookAlikes, Nearest, Patch, Search, Seed, VoteColumns};
+use daymark_core::kernel::{self, BoxSums, Kernels, LookAlikes, Nearest, Patch, Portable, Search, Seed, VoteColumns};
 
 /// The kernels of one processor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -45,6 +45,18 @@ impl Processor {
             available.extend(Avx512::detect().map(Self::Avx512));
         }
         available
+    }
+
+    /// Its kernels. A call by the table of methods costs nothing beside a row of pixels or a list of distances, and the
+    /// loops around the kernels are compiled once.
+    pub fn kernels(&self) -> &dyn Kernels {
+        match self {
+            Self::Portable => &Portable,
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2(kernels) => kernels,
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512(kernels) => kernels,
+        }
     }
 
     /// A short name.
@@ -136,27 +148,3 @@ all_kernels!(
     ["avx2", "popcnt", "bmi1", "bmi2", "lzcnt", "avx512f", "avx512bw", "avx512dq", "avx512vl", "avx512vpopcntdq"],
     avx512
 );
-
-/// Calls the expression with the kernels of this processor, each as its own type, so that the caller's loops are
-/// compiled for each.
-#[macro_export]
-macro_rules! with_kernels {
-    ($processor:expr, $kernels:ident => $body:expr) => {
-        match $processor {
-            $crate::simd::Processor::Portable => {
-                let $kernels = &daymark_core::kernel::Portable;
-                $body
-            }
-            #[cfg(target_arch = "x86_64")]
-            $crate::simd::Processor::Avx2(kernels) => {
-                let $kernels = &kernels;
-                $body
-            }
-            #[cfg(target_arch = "x86_64")]
-            $crate::simd::Processor::Avx512(kernels) => {
-                let $kernels = &kernels;
-                $body
-            }
-        }
-    };
-}

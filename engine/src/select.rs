@@ -1,19 +1,17 @@
 //! Which corners of a picture are worth storing: those that are found again, and not confused, in simulated views.
 
 use daymark_core::candidate::surprise;
-use daymark_core::extract::{Extractor, FeatureSet, FrontEnd};
+use daymark_core::extract::FrontEnd;
 use daymark_core::feature::{COMMONNESS, Feature, Signature};
-use daymark_core::kernel::Kernels;
 use daymark_core::math::{exp2, log2, log2_q8};
-use daymark_core::pyramid::{level_bytes, scale};
+use daymark_core::pyramid::scale;
 use daymark_core::table::on_grid;
-use daymark_core::tone::TonedFrame;
 
-use super::simulate::CHANGES;
-use crate::picture::GrayImage;
+use crate::gray::GrayImage;
+use crate::reader::FrameReader;
+use crate::simd::Processor;
+use crate::simulate::CHANGES;
 
-/// Candidates of a picture, at most.
-pub const MOST_CANDIDATES: usize = 1_600;
 /// e^0.55, the tolerance of a corner's scale.
 const SCALE_TOLERANCE: f32 = 1.733_253;
 /// Cells over the picture that share the places, and the least distance of two kept corners in pixels.
@@ -31,8 +29,6 @@ pub struct Selection {
     pub keep: usize,
 }
 
-type WideExtractor = Extractor<256, { 48 * 3 * 64 }>;
-
 /// A corner that may be stored, with what the simulated views and the turned copies said of it.
 struct Candidate {
     feature: Feature,
@@ -46,12 +42,13 @@ struct Candidate {
 ///
 /// Six simulated views are read exactly like frames; a candidate is worth what it survives, divided by the root of how
 /// common its signature is.
-pub fn select_corners<K: Kernels>(kernels: &K, image: &GrayImage, selection: Selection) -> Vec<Feature> {
-    let mut reader = Reader::new(kernels);
+pub fn select_corners(processor: Processor, image: &GrayImage, selection: Selection) -> Vec<Feature> {
+    let mut reader = FrameReader::new(processor);
     let fresh = |feature| Candidate { feature, survival: 0, commonness: 0.0 };
-    let mut candidates: Vec<Candidate> = reader.read(image, selection.candidates).into_iter().map(fresh).collect();
+    let mut candidates: Vec<Candidate> =
+        features(&mut reader, image, selection.candidates).into_iter().map(fresh).collect();
     for (seed, change) in CHANGES.iter().enumerate() {
-        let found = reader.read(&change.render(image, seed as u64), selection.query);
+        let found = features(&mut reader, &change.render(image, seed as u64), selection.query);
         let map_scale = daymark_core::math::sqrt(change.area() as f32);
         for candidate in &mut candidates {
             let [x, y] = candidate.feature.position.to_pixels();
@@ -61,7 +58,7 @@ pub fn select_corners<K: Kernels>(kernels: &K, image: &GrayImage, selection: Sel
     }
     let strangers: Vec<Signature> = turned_copies(image)
         .iter()
-        .flat_map(|turned| reader.read(turned, selection.query))
+        .flat_map(|turned| features(&mut reader, turned, selection.query))
         .map(|feature| feature.signature)
         .collect();
     for candidate in &mut candidates {
@@ -70,29 +67,9 @@ pub fn select_corners<K: Kernels>(kernels: &K, image: &GrayImage, selection: Sel
     keep_spread(&candidates, image, selection.keep)
 }
 
-/// Reads pictures as a camera frame is read.
-struct Reader<'a, K> {
-    kernels: &'a K,
-    extractor: Box<WideExtractor>,
-    toned: Vec<u8>,
-    levels: Vec<u8>,
-    features: Box<FeatureSet<MOST_CANDIDATES>>,
-}
-
-impl<'a, K: Kernels> Reader<'a, K> {
-    fn new(kernels: &'a K) -> Self {
-        Self { kernels, extractor: Box::default(), toned: Vec::new(), levels: Vec::new(), features: Box::default() }
-    }
-
-    fn read(&mut self, image: &GrayImage, front_end: FrontEnd) -> Vec<Feature> {
-        self.levels.resize(level_bytes(image.width, image.height), 0);
-        self.toned.resize(image.width * image.height, 0);
-        let extracted =
-            image.view().and_then(|view| TonedFrame::write(self.kernels, view, &mut self.toned)).and_then(|toned| {
-                self.extractor.extract(self.kernels, toned, front_end, &mut self.levels, &mut self.features)
-            });
-        if extracted.is_ok() { self.features.view().iter().collect() } else { Vec::new() }
-    }
+/// The features of a picture, read as a camera frame is; none of one beyond core's limits.
+fn features(reader: &mut FrameReader, image: &GrayImage, front_end: FrontEnd) -> Vec<Feature> {
+    reader.read(image, front_end).map_or(Vec::new(), |features| features.iter().collect())
 }
 
 /// Adds `(1 - d / 53.8) / (1 + log2(1 + rank) / 2)`, at least 0, to a candidate's survival: `d` is the distance to the

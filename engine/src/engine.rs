@@ -1,20 +1,18 @@
 //! Core's recognizer with the memory of a PC and the kernels of this processor.
 
 use daymark_core::evidence::CornerEvidence;
-use daymark_core::extract::{Extractor, FeatureSet, Features, FrontEnd};
+use daymark_core::extract::{Features, FrontEnd};
 use daymark_core::image::FrameError;
 use daymark_core::matcher::ViewMatch;
 use daymark_core::profile::Profile;
-use daymark_core::pyramid::level_bytes;
 use daymark_core::recognizer::Recognizer;
-use daymark_core::table::{StoredView, ViewSource};
-use daymark_core::tone::TonedFrame;
+use daymark_core::table::{LandmarkTable, StoredView, TableError, ViewSource};
 use daymark_core::verdict::{FalseAnswer, Recognition};
 
-use crate::enroll::select::Selection;
-use crate::picture::GrayImage;
+use crate::gray::GrayImage;
+use crate::reader::FrameReader;
+use crate::select::Selection;
 use crate::simd::Processor;
-use crate::with_kernels;
 
 /// Stack of a thread that makes engines and extractors: they pass through it on their way to the heap. Only what is
 /// touched costs memory.
@@ -40,10 +38,6 @@ pub const fn selection(profile: Profile) -> Selection {
 
 /// Features of a frame, at most.
 pub const QUERY_FEATURES: usize = 1_600;
-/// Width of a strip of responses: a frame of 640 px takes two, and their rows stay in the first cache.
-pub const STRIP: usize = 336;
-const SLOTS: usize = selection(Profile::Board).query.slots();
-
 type HandheldRecognizer = Recognizer<100, 200, 512, 800>;
 type BoardRecognizer = Recognizer<800, 800, 2_048, QUERY_FEATURES>;
 
@@ -67,12 +61,8 @@ fn board() -> AnyRecognizer {
 /// Everything that recognizing frames needs, allocated once.
 #[derive(Debug)]
 pub struct Engine {
-    processor: Processor,
     profile: Profile,
-    extractor: Box<Extractor<STRIP, SLOTS>>,
-    features: Box<FeatureSet<QUERY_FEATURES>>,
-    toned: Vec<u8>,
-    levels: Vec<u8>,
+    reader: FrameReader,
     recognizer: AnyRecognizer,
     distances: Vec<u8>,
     record: Vec<u8>,
@@ -91,12 +81,8 @@ impl Engine {
             _ => (handheld(), HandheldRecognizer::DISTANCE_BYTES),
         };
         Self {
-            processor,
             profile,
-            extractor: Box::default(),
-            features: Box::default(),
-            toned: Vec::new(),
-            levels: Vec::new(),
+            reader: FrameReader::new(processor),
             recognizer,
             distances: vec![0; distances],
             record: Vec::new(),
@@ -105,7 +91,7 @@ impl Engine {
 
     /// The kernels in use.
     pub const fn processor(&self) -> Processor {
-        self.processor
+        self.reader.processor()
     }
 
     /// Reads the features of a frame, which later calls refer to.
@@ -113,40 +99,39 @@ impl Engine {
     /// # Errors
     /// [`FrameError`] for a frame beyond core's limits.
     pub fn extract(&mut self, frame: &GrayImage) -> Result<(), FrameError> {
-        self.levels.resize(level_bytes(frame.width, frame.height), 0);
-        self.toned.resize(frame.width * frame.height, 0);
-        let front_end = selection(self.profile).query;
-        let view = frame.view()?;
-        with_kernels!(self.processor, kernels => {
-            let toned = TonedFrame::write(kernels, view, &mut self.toned)?;
-            self.extractor.extract(kernels, toned, front_end, &mut self.levels, &mut self.features)
-        })
+        self.reader.read(frame, selection(self.profile).query).map(|_| ())
     }
 
     /// The features of the latest frame.
     pub fn features(&self) -> Features<'_> {
-        self.features.view()
+        self.reader.features()
     }
 
     /// Compares the latest frame with every view of a table.
     ///
     /// # Errors
-    /// What the table's source says.
-    pub fn recognize<S: ViewSource>(&mut self, table: &mut S, limit: FalseAnswer) -> Result<Recognition, S::Error> {
+    /// What the table says.
+    pub fn recognize(&mut self, table: &mut LandmarkTable<'_>, limit: FalseAnswer) -> Result<Recognition, TableError> {
         self.record.resize(table.buffer_bytes(), 0);
-        let (frame, distances, record) = (self.features.view(), &mut self.distances, &mut self.record);
-        with_kernels!(self.processor, kernels => match &mut self.recognizer {
-            AnyRecognizer::Handheld(recognizer) => recognizer.recognize(kernels, frame, table, distances, record, limit),
+        let Self { reader, recognizer, distances, record, .. } = self;
+        let (processor, frame) = (reader.processor(), reader.features());
+        let kernels = processor.kernels();
+        match recognizer {
+            AnyRecognizer::Handheld(recognizer) => {
+                recognizer.recognize(kernels, frame, table, distances, record, limit)
+            }
             AnyRecognizer::Board(recognizer) => recognizer.recognize(kernels, frame, table, distances, record, limit),
-        })
+        }
     }
 
     /// Matches one view with the latest frame and tells what each stored corner said.
     pub fn explain(&mut self, view: &StoredView<'_>) -> Option<(ViewMatch, &[CornerEvidence])> {
-        let (frame, distances) = (self.features.view(), &mut self.distances);
-        with_kernels!(self.processor, kernels => match &mut self.recognizer {
+        let Self { reader, recognizer, distances, .. } = self;
+        let (processor, frame) = (reader.processor(), reader.features());
+        let kernels = processor.kernels();
+        match recognizer {
             AnyRecognizer::Handheld(recognizer) => recognizer.explain(kernels, frame, view, distances),
             AnyRecognizer::Board(recognizer) => recognizer.explain(kernels, frame, view, distances),
-        })
+        }
     }
 }

@@ -1,6 +1,6 @@
 //! Views of a picture from elsewhere: warped, relit, blurred, with noise. Integer arithmetic and a fixed seed.
 
-use crate::picture::GrayImage;
+use crate::gray::GrayImage;
 
 /// What a simulated view does to the picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
