@@ -23,6 +23,7 @@ pub mod table_file;
 pub mod dataset;
 mod calendar;
 mod parallel;
+mod order;
 mod log;
 pub mod frame;
 pub mod report;

@@ -8,6 +8,7 @@ mod replace;
 
 pub use replace::replace_file;
 
+use crate::order;
 use daymark_core::feature::Feature;
 use daymark_core::profile::Profile;
 use daymark_core::table::{
@@ -136,7 +137,7 @@ impl OwnedTable {
     /// The first landmark or view that cannot be stored.
     pub fn to_bytes(&self) -> Result<Vec<u8>, BuildError> {
         let mut landmarks: Vec<&LandmarkEntry> = self.landmarks.iter().collect();
-        landmarks.sort_by(|a, b| a.name.as_bytes().cmp(b.name.as_bytes()));
+        order::sort_by(&mut landmarks, |a, b| a.name.as_bytes().cmp(b.name.as_bytes()));
         if let Some(twice) = landmarks.windows(2).find(|pair| pair[0].name == pair[1].name) {
             return Err(BuildError::DuplicateName(twice[0].name.clone()));
         }
@@ -196,7 +197,7 @@ impl OwnedTable {
 fn encode_sorted(corners_limit: u16, view: &ViewEntry) -> Result<Vec<u8>, EncodeError> {
     let mut features = view.features.clone();
     // A corner that has no place in any view sorts to the end and is refused there.
-    features.sort_by_key(|feature| corner_key(feature).unwrap_or(u32::MAX));
+    order::sort_by_key(&mut features, |feature| corner_key(feature).unwrap_or(u32::MAX));
     let mut record = vec![0; VIEW_HEADER_BYTES + features.len() * CORNER_BYTES];
     let length = encode_view(corners_limit, view.width, view.height, &features, &mut record)?.len();
     record.truncate(length);

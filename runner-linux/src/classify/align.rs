@@ -4,6 +4,7 @@ use nalgebra::Vector3;
 use serde::Serialize;
 
 use super::cloud::{Cloud, Similarity, vector};
+use crate::order;
 
 /// How clouds come together.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, clap::ValueEnum)]
@@ -66,7 +67,7 @@ fn best_shift(test: &Cloud, base: &Cloud) -> Similarity {
         }
     }
     // The sort is stable: of equally good starts the first.
-    found.sort_by(|a, b| a.1.total_cmp(&b.1));
+    order::sort_by(&mut found, |a, b| a.1.total_cmp(&b.1));
     let mut refined: Vec<(Similarity, f64)> = Vec::new();
     for (start, _) in found {
         let apart =
@@ -78,7 +79,7 @@ fn best_shift(test: &Cloud, base: &Cloud) -> Similarity {
     let sample = test.sample(SAMPLE);
     let mut settled: Vec<_> =
         refined.into_iter().map(|(map, _)| settle(&sample, base, map.translation, (high - low).norm())).collect();
-    settled.sort_by(|a, b| a.1.total_cmp(&b.1));
+    order::sort_by(&mut settled, |a, b| a.1.total_cmp(&b.1));
     Similarity::shift(settled.first().map_or(middle, |best| best.0))
 }
 

@@ -16,6 +16,7 @@ use serde::Serialize;
 use super::{CommandError, Outcome};
 use crate::engine::{Engine, FRAME_SIDE};
 use crate::enroll;
+use crate::order;
 use crate::parallel;
 use crate::picture::{GrayImage, read_gray};
 use crate::simd::Processor;
@@ -70,7 +71,7 @@ impl Times {
     }
 
     fn of(mut times: Vec<f64>) -> Self {
-        times.sort_by(f64::total_cmp);
+        order::ascending(&mut times);
         let at = |place: usize| times.get(place).copied().unwrap_or(0.0);
         let middle = times.len() / 2;
         let median = if times.len() % 2 == 1 { at(middle) } else { f64::midpoint(at(middle.max(1) - 1), at(middle)) };

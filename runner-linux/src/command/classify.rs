@@ -13,6 +13,7 @@ use crate::classify::decide::{Answer, Intensity, Refusal, Rule};
 use crate::classify::experiment::{Method, Row, compare_with_each, size};
 use crate::classify::histogram::{Histogram, coloured};
 use crate::model_file::ply;
+use crate::order;
 use crate::table_file::replace_file;
 
 /// Version of the form of `--json`.
@@ -124,7 +125,7 @@ fn read_bases(folder: &Path) -> Result<(Vec<String>, Vec<Cloud>), CommandError> 
         std::fs::read_dir(folder).map_err(|error| format!("cannot read the folder {}: {error}", folder.display()))?;
     let mut paths: Vec<PathBuf> = entries.filter_map(|entry| Some(entry.ok()?.path())).collect();
     paths.retain(|path| path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("ply")));
-    paths.sort();
+    order::sort(&mut paths);
     if paths.is_empty() {
         return Err(
             format!("{} has no .ply files: write models there with `daymark synthesize -o`", folder.display()).into()

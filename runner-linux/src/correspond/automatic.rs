@@ -6,6 +6,7 @@ use daymark_core::point::ImagePoint;
 use daymark_engine::reader::FrameReader;
 
 use super::MOST_CORNERS;
+use crate::order;
 use crate::picture::GrayImage;
 use crate::simd::Processor;
 
@@ -33,7 +34,7 @@ pub fn corners(image: &GrayImage, count: usize) -> Result<Vec<ImagePoint>, Frame
     let features = reader.read(image, front_end)?;
     let finest = features.iter().filter(|feature| feature.level == 0).take(count);
     let mut corners: Vec<ImagePoint> = finest.map(|feature| feature.position).collect();
-    corners.sort_unstable();
+    order::sort(&mut corners);
     Ok(corners)
 }
 

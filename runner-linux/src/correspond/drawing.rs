@@ -9,6 +9,7 @@ use super::fate::{Judge, LayerQuadFate, QuadFate};
 use super::finding::Finding;
 use super::matching::{FoundBy, Matched, Matching};
 use super::text::headline;
+use crate::order;
 use crate::report::data_uri;
 use crate::report::overlay::{
     FONT, INK, MARGIN, NIGHT, PALE, PANEL, Place, circle, line_of_text, picture, rectangle, segment,
@@ -154,7 +155,7 @@ impl Drawing<'_> {
         let faint = (40.0 / quads.len().max(1) as f32).min(1.0);
         // The matched ones last, on top.
         let mut order: Vec<&LayerQuadFate> = quads.iter().collect();
-        order.sort_by_key(|quad| core::cmp::Reverse(quad.fate));
+        order::sort_by_key(&mut order, |quad| core::cmp::Reverse(quad.fate));
         for quad in order {
             let title = self.quad_title(quad);
             let sides = [Some(quad.vertices), quad.partners];

@@ -10,6 +10,7 @@ use daymark_core::geometry::{GeometryError, HullLayers};
 use daymark_core::point::ImagePoint;
 
 use super::{Corners, MOST_CORNERS};
+use crate::order;
 
 /// Layers of [`MOST_CORNERS`] corners, at most.
 pub const MOST_LAYERS: usize = MOST_CORNERS / 3 + 1;
@@ -188,7 +189,7 @@ impl Matcher {
                 residual_px: Some(found.residual),
             })
             .collect();
-        pairs.sort_by_key(|matched| matched.pair);
+        order::sort_by_key(&mut pairs, |matched| matched.pair);
         credit(&mut pairs, &from_layers, &from_arrangements);
         Ok(Matching {
             rule: Rule::Tolerant { sources: settings.sources, noise_px: settings.terms.sigma },
@@ -258,7 +259,7 @@ fn plain(first: &[ImagePoint], second: &[ImagePoint], epsilon: Tolerance) -> Res
             residual_px: None,
         }));
     }
-    pairs.sort_by_key(|matched| matched.pair);
+    order::sort_by_key(&mut pairs, |matched| matched.pair);
     Ok(Matching {
         rule: Rule::Plain { epsilon },
         nested: [nested(&layers[0]), nested(&layers[1])],

@@ -12,6 +12,7 @@ use daymark_core::verdict::{Calibration, FalseAnswer};
 
 use super::simulate::CHANGES;
 use crate::engine::Engine;
+use crate::order;
 use crate::picture::GrayImage;
 
 /// The simulated views' noise begins here, so that it is not the noise with which corners were chosen.
@@ -89,7 +90,7 @@ pub fn lint(
         engine.extract(&change.render(picture, seed))?;
         simulated.push(evidence(engine, &view));
     }
-    simulated.sort_unstable();
+    order::sort(&mut simulated);
     engine.extract(&mirrored(picture))?;
     let mirror = evidence(engine, &view);
 
@@ -107,7 +108,7 @@ pub fn lint(
             lookalikes.push((found, LookAlike { name: landmark.name.to_owned(), bits: bits(found), false_answer }));
         }
     }
-    lookalikes.sort_by_key(|(found, _)| std::cmp::Reverse(*found));
+    order::sort_by_key(&mut lookalikes, |(found, _)| std::cmp::Reverse(*found));
     lookalikes.truncate(LOOKALIKES_TOLD);
 
     Ok(ViewLint {
@@ -176,7 +177,7 @@ fn repetition(engine: &Engine, view: &StoredView<'_>) -> Repetition {
             }
         }
     }
-    shifts.sort_unstable();
+    order::sort(&mut shifts);
     shifts.dedup();
     let most = shifts.chunk_by(|a, b| a.0 == b.0).max_by_key(|same| (same.len(), std::cmp::Reverse(same[0].0)));
     Repetition {

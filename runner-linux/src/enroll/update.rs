@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use daymark_core::table::{GeoPosition, Kind, corner_key};
 
 use super::plan::{Picture, Plan};
+use crate::order;
 use crate::picture::GrayImage;
 use crate::table_file::{LandmarkEntry, OwnedTable, ViewEntry};
 
@@ -114,7 +115,7 @@ pub fn apply(table: &mut OwnedTable, plan: Plan, pictures: Vec<Picture>, replace
 pub fn is_same(a: &ViewEntry, b: &ViewEntry) -> bool {
     let sorted = |view: &ViewEntry| {
         let mut features = view.features.clone();
-        features.sort_by_key(|feature| corner_key(feature).unwrap_or(u32::MAX));
+        order::sort_by_key(&mut features, |feature| corner_key(feature).unwrap_or(u32::MAX));
         features
     };
     (a.width, a.height, a.features.len()) == (b.width, b.height, b.features.len()) && sorted(a) == sorted(b)

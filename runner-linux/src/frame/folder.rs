@@ -7,6 +7,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant, SystemTime};
 
 use super::{Delivery, Fault, Frame, FrameSource, Opener};
+use crate::order;
 use crate::picture::read_gray;
 
 const ENDINGS: [&str; 10] = ["jpg", "jpeg", "png", "pgm", "ppm", "pnm", "bmp", "webp", "tif", "tiff"];
@@ -28,7 +29,7 @@ pub fn pictures(path: &Path) -> Result<Vec<PathBuf>, String> {
             files.push(file);
         }
     }
-    files.sort();
+    order::sort(&mut files);
     if files.is_empty() {
         return Err(format!("no pictures in {}; their names end in {}", path.display(), ENDINGS.join(", ")));
     }

@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use super::finding::bits;
 use crate::engine::Engine;
+use crate::order;
 
 /// A corner with this much evidence is strong.
 pub const STRONG_BITS: f64 = 4.0;
@@ -196,7 +197,7 @@ impl ViewExplanation {
             })
         };
         let mut corners: Vec<ExplainedCorner> = said.iter().filter_map(explained).collect();
-        corners.sort_by(|a, b| b.evidence_bits.total_cmp(&a.evidence_bits).then(a.corner.cmp(&b.corner)));
+        order::sort_by(&mut corners, |a, b| b.evidence_bits.total_cmp(&a.evidence_bits).then(a.corner.cmp(&b.corner)));
         Ok(Some(Self {
             landmark,
             view: answer.view,
@@ -241,7 +242,7 @@ impl Group {
     fn new(said: Said, corners: &[ExplainedCorner]) -> Option<Self> {
         let members: Vec<&ExplainedCorner> = corners.iter().filter(|corner| corner.said == said).collect();
         let mut residuals: Vec<f32> = members.iter().filter_map(|corner| corner.residual_px).collect();
-        residuals.sort_by(f32::total_cmp);
+        residuals.sort_unstable_by(f32::total_cmp);
         (!members.is_empty()).then(|| Self {
             said,
             corners: members.len(),

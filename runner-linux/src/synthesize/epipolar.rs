@@ -5,6 +5,7 @@
 //! view, `E = [t] R`. A pair of directions has the Sampson distance `x2' E x1 / |(E x1, E' x2)|` (first-order geometric
 //! error; Hartley and Zisserman, 11.4.3).
 
+use crate::order;
 use daymark_core::linear::NormalEquations;
 use daymark_fixtures::random::SplitMix64;
 use nalgebra::{Matrix3, Rotation3, Vector3};
@@ -241,7 +242,7 @@ pub fn relative_pose(pairs: &[Pair], threshold: f64, seed: u64) -> Option<Estima
             (pose.rotation * homogeneous(a)).angle(&homogeneous(b)).to_degrees()
         })
         .collect();
-    angles.sort_unstable_by(f64::total_cmp);
+    order::ascending(&mut angles);
     let chosen: Vec<&Pair> = inliers.iter().map(|&number| &pairs[number]).collect();
     let (rotation_share, plane_share) = (rotation_share(&chosen, threshold), plane_share(&chosen, threshold, seed));
     Some(Estimate { pose, parallax_degree: angles[angles.len() / 2], rotation_share, plane_share, inliers })

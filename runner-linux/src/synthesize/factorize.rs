@@ -15,6 +15,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, Matrix3xX, SMatrix, SVector, Vector3};
 
 use super::view::{Station, Track};
 use crate::camera_file::lens::Pose;
+use crate::order;
 
 /// What a factorization gave.
 #[derive(Debug, Clone)]
@@ -96,7 +97,7 @@ pub fn factorize(tracks: &[Track], views: usize) -> Result<Factorization, NoShap
     // The left singular vectors are the eigenvectors of W W', which is small.
     let eigen = (&images * images.transpose()).symmetric_eigen();
     let mut order: Vec<usize> = (0..2 * views).collect();
-    order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
+    order::sort_by(&mut order, |&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
     let singular = |place: usize| order.get(place).map_or(0.0, |&at| libm::sqrt(eigen.eigenvalues[at].max(0.0)));
     if !(singular(2) > FLAT * singular(1)) {
         return Err(NoShape::Flat { third_share: singular(2) / singular(1).max(f64::MIN_POSITIVE) });

@@ -7,6 +7,7 @@ use daymark_core::kernel::places;
 use daymark_engine::reader::{FrameReader, MOST_FEATURES};
 
 use super::view::View;
+use crate::order;
 use crate::simd::Processor;
 
 /// Features of a view, at most.
@@ -121,7 +122,7 @@ pub fn guided_matches(
         }
     }
     // One to one, the best first.
-    found.sort_unstable();
+    order::sort(&mut found);
     found
         .into_iter()
         .filter_map(|(_, pair)| {

@@ -7,6 +7,7 @@ use super::reconstruct::Reconstruction;
 use super::view::Station;
 use crate::camera_file::lens::Pose;
 use crate::classify::cloud::Similarity;
+use crate::order;
 
 /// What says how long a metre is.
 #[derive(Debug, Clone, PartialEq)]
@@ -40,7 +41,7 @@ pub fn upright(made: &Reconstruction, scale: &Scale) -> Option<Similarity> {
         made.model.surface.vertices.iter().map(|vertex| rotation * vertex.position).collect();
     let range = |axis: usize| {
         let mut values: Vec<f64> = turned.iter().map(|point| point[axis]).collect();
-        values.sort_unstable_by(f64::total_cmp);
+        order::ascending(&mut values);
         let at = |share: f64| values.get((values.len() as f64 * share) as usize).copied().unwrap_or(0.0);
         [at(0.01), at(0.99)]
     };
@@ -61,7 +62,7 @@ pub fn upright(made: &Reconstruction, scale: &Scale) -> Option<Similarity> {
                     }
                 }
             }
-            factors.sort_unstable_by(f64::total_cmp);
+            order::ascending(&mut factors);
             *factors.get(factors.len() / 2)?
         }
     };

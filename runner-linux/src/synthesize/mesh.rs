@@ -13,6 +13,7 @@ use spade::handles::FixedVertexHandle;
 use spade::{DelaunayTriangulation, HasPosition, Point2, Triangulation};
 
 use super::view::{Station, Surface, Vertex};
+use crate::order;
 use crate::parallel;
 
 /// What was dropped, and why.
@@ -179,7 +180,7 @@ fn spaced(
     mut points: Vec<(u32, [f64; 2], [f64; 2])>,
     spacing_px: f64,
 ) -> Vec<(u32, [f64; 2], [f64; 2])> {
-    points.sort_by(|a, b| {
+    order::sort_by(&mut points, |a, b| {
         let (p, q) = (&vertices[a.0 as usize], &vertices[b.0 as usize]);
         let views = q.track.sightings.len().cmp(&p.track.sightings.len());
         views.then(p.reprojection_px.total_cmp(&q.reprojection_px)).then(a.0.cmp(&b.0))
@@ -199,7 +200,7 @@ fn spaced(
         kept.entry([x, y]).or_default().push(at);
         true
     });
-    points.sort_by_key(|point| point.0);
+    order::sort_by_key(&mut points, |point| point.0);
     points
 }
 

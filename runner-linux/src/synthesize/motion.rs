@@ -11,6 +11,7 @@ use super::correspond::{MIN_INLIERS, MIN_SHARE, PairMatches};
 use super::view::{Station, Track, View};
 use crate::camera_file::distortion::Distortion;
 use crate::camera_file::lens::{Lens, Pose};
+use crate::order;
 
 /// Why there is no motion. Each has the figure that decided.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -247,7 +248,7 @@ impl<'a> Growth<'a> {
                         .filter(|sighting| sighting.2)
                         .filter_map(|&(view, at, _)| Some(Observation { camera: place(view)?, at }))
                         .collect();
-                    seen.sort_by_key(|observation| observation.camera);
+                    order::sort_by_key(&mut seen, |observation| observation.camera);
                     seen
                 })
                 .collect(),
@@ -359,7 +360,7 @@ impl<'a> Growth<'a> {
         if lengths.len() < 8 {
             return None;
         }
-        lengths.sort_unstable_by(f64::total_cmp);
+        order::ascending(&mut lengths);
         let length = lengths[lengths.len() / 2];
         let turned = rotation * base.view_from_model;
         let translation = rotation * base.translation() + shift * length;

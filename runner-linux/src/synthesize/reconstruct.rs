@@ -14,6 +14,7 @@ use super::motion::{NoMotion, motion};
 use super::triangulate::Rules;
 use super::view::{Station, Track, View};
 use crate::camera_file::lens::Pose;
+use crate::order;
 use crate::parallel;
 
 /// Where correspondences come from.
@@ -277,6 +278,6 @@ fn mesh_pairs(tracks: &[Track], views: usize) -> Vec<[usize; 2]> {
             (shared[view][partner] >= 3).then_some((shared[view][partner], [view, partner]))
         })
         .collect();
-    pairs.sort_by_key(|&(count, pair)| (usize::MAX - count, pair));
+    order::sort_by_key(&mut pairs, |&(count, pair)| (usize::MAX - count, pair));
     pairs.into_iter().map(|(_, pair)| pair).collect()
 }

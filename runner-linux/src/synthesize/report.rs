@@ -7,6 +7,7 @@ use super::dense::DenseCloud;
 use super::mesh::Dropped;
 use super::reconstruct::{PairFacts, Reconstruction, Shape};
 use super::triangulate::Refusals;
+use crate::order;
 
 /// Version of the form of `--json`.
 pub const SCHEMA_VERSION: u32 = 1;
@@ -84,7 +85,7 @@ pub struct ViewFacts {
 }
 
 fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_unstable_by(f64::total_cmp);
+    order::ascending(&mut values);
     values.get(values.len() / 2).copied().unwrap_or(0.0)
 }
 
@@ -126,7 +127,7 @@ pub fn facts(made: &Reconstruction, dense: &DenseCloud, length_unit: &'static st
         .collect();
     let extent = [0, 1, 2].map(|axis: usize| {
         let mut values: Vec<f64> = vertices.iter().map(|vertex| vertex.position[axis]).collect();
-        values.sort_unstable_by(f64::total_cmp);
+        order::ascending(&mut values);
         let at = |share: f64| values.get((values.len() as f64 * share) as usize).copied().unwrap_or(0.0);
         at(0.99) - at(0.01)
     });

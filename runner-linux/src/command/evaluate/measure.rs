@@ -14,6 +14,7 @@ use super::super::CommandError;
 use crate::dataset::Dataset;
 use crate::engine::{Engine, FRAME_SIDE, STACK_BYTES};
 use crate::enroll;
+use crate::order;
 use crate::parallel;
 use crate::picture::{GrayImage, read_gray};
 use crate::report::evaluation::{GalleryView, Guess, Judged, Outcome, Times, percentile};
@@ -249,7 +250,7 @@ impl Run {
     pub(super) fn times(&self, gallery: &Gallery) -> Times {
         let sorted = |values: &mut dyn Iterator<Item = f64>| {
             let mut values: Vec<f64> = values.collect();
-            values.sort_by(f64::total_cmp);
+            order::ascending(&mut values);
             values
         };
         let views = gallery.views.len().max(1) as f64;

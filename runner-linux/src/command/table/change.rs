@@ -11,6 +11,7 @@ use super::inspect::no_such_landmark;
 use super::{OnDuplicate, print};
 use crate::command::CommandError;
 use crate::enroll::update::is_same;
+use crate::order;
 use crate::report::phrase::{count, printable};
 use crate::table_file::{LandmarkEntry, OwnedTable, open_table};
 
@@ -68,7 +69,7 @@ pub(super) fn merge(args: &Merge<'_>, json: bool) -> Result<(), CommandError> {
             }
         }
     }
-    duplicates.sort();
+    order::sort(&mut duplicates);
     duplicates.dedup();
     if !duplicates.is_empty() && args.on_duplicate == OnDuplicate::Error {
         let names: Vec<String> = duplicates.iter().take(5).map(|name| format!("{name:?}")).collect();

@@ -1,5 +1,6 @@
 //! Names that somebody may have meant.
 
+use crate::order;
 use crate::report::phrase::printable;
 
 /// Names that are told, at most.
@@ -17,7 +18,7 @@ pub(super) fn suggestion<'a>(wanted: &str, names: impl Iterator<Item = &'a str>)
             (distance <= most).then_some((distance, name))
         })
         .collect();
-    near.sort_unstable();
+    order::sort(&mut near);
     if near.is_empty() {
         return String::new();
     }

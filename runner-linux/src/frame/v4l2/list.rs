@@ -11,6 +11,7 @@ use v4l::{Device, FourCC};
 
 use super::{RAW_DRIVERS, capabilities};
 use crate::frame::convert::PixelFormat;
+use crate::order;
 
 /// Devices, formats and sizes, as text for a person.
 pub fn list() -> String {
@@ -31,7 +32,7 @@ fn devices() -> Vec<PathBuf> {
     let entries = fs::read_dir("/dev").into_iter().flatten().flatten();
     let mut devices: Vec<(u32, PathBuf)> =
         entries.filter_map(|entry| Some((number(&entry.path())?, entry.path()))).collect();
-    devices.sort();
+    order::sort(&mut devices);
     devices.into_iter().map(|(_, path)| path).collect()
 }
 
@@ -41,7 +42,7 @@ fn links(device: &Path) -> Vec<PathBuf> {
     let entries = folders.into_iter().flat_map(|folder| fs::read_dir(folder).into_iter().flatten().flatten());
     let leads_here = |path: &PathBuf| fs::canonicalize(path).is_ok_and(|target| target == device);
     let mut links: Vec<PathBuf> = entries.map(|entry| entry.path()).filter(leads_here).collect();
-    links.sort();
+    order::sort(&mut links);
     links
 }
 

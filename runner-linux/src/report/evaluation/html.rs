@@ -7,6 +7,7 @@ use svg::node::element::{Image, Polygon};
 
 use super::score::{interval, recall_curve, share};
 use super::{Evaluation, Guess, Judged, Outcome};
+use crate::order;
 use crate::picture::GrayImage;
 use crate::report::page::{escape, table, tile};
 use crate::report::phrase::{count, milliseconds, probability};
@@ -71,7 +72,7 @@ fn reliability_plot(evaluation: &Evaluation) -> Plot {
     let negatives: Vec<&Judged> = evaluation.frames.iter().filter(|frame| frame.shows.is_none()).collect();
     let stated = |frame: &&Judged| frame.best.as_ref().map_or(1.0, |best| best.probability_false_answer);
     let mut probabilities: Vec<f64> = negatives.iter().map(stated).collect();
-    probabilities.sort_by(f64::total_cmp);
+    order::ascending(&mut probabilities);
     let mut steps = Vec::new();
     for (below, &p) in probabilities.iter().enumerate() {
         steps.push([p, share(below, negatives.len())]);

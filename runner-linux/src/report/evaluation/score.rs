@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use super::{Judged, Outcome};
+use crate::order;
 
 /// Lower ends of the bins of the reliability table; a bin reaches up to the next, the last to 1 and includes it.
 const BINS: [f64; 7] = [0.0, 1e-4, 1e-3, 1e-2, 0.1, 0.5, 1.0];
@@ -187,7 +188,7 @@ fn reliability(frames: &[Judged]) -> Vec<Bin> {
 
 fn sources(frames: &[Judged], threshold: Option<f64>) -> Vec<Source> {
     let mut names: Vec<&str> = frames.iter().map(|frame| frame.source.as_str()).collect();
-    names.sort_unstable();
+    order::sort(&mut names);
     names.dedup();
     let of = |name: &str| {
         let count = |query: bool, keep: &dyn Fn(&Judged) -> bool| {
@@ -228,7 +229,7 @@ pub fn recall_curve(frames: &[Judged]) -> Vec<(usize, usize)> {
         .filter_map(|frame| frame.best.as_ref().map(|best| (best.evidence_bits, frame.right_at_1)))
         .collect();
     // Of equal evidence the false ones first: a limit lets in all or none.
-    ranked.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+    order::sort_by(&mut ranked, |a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
     let mut curve = vec![(0, 0)];
     let (mut false_accepts, mut right) = (0, 0);
     for (_, is_right) in ranked {

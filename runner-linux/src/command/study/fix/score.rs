@@ -9,6 +9,7 @@ use daymark_fixtures::{Corner, Scene};
 use serde::Serialize;
 
 use super::walk::{LENS, Spoil, Stop, by_chance, by_place, correspondences, site, town};
+use crate::order;
 use crate::parallel;
 
 /// Correspondences of all towers of a frame.
@@ -170,7 +171,7 @@ impl Answer {
 
 /// The value below which a share of sorted numbers lies; 0 without numbers.
 fn quantile(mut numbers: Vec<f64>, share: f64) -> f64 {
-    numbers.sort_by(f64::total_cmp);
+    order::ascending(&mut numbers);
     let last = numbers.len().saturating_sub(1);
     numbers.get(libm::round(share * last as f64) as usize).copied().unwrap_or(0.0)
 }

@@ -8,6 +8,7 @@ use daymark_fixtures::Scene;
 use super::score::{Case, Figures};
 use super::walk::{Stop, hull, site, town};
 use super::{LARGE, Report};
+use crate::order;
 use crate::report::map::{Building, Observer, Plan};
 use crate::report::plot::{Axis, Curve, Plot};
 
@@ -83,7 +84,7 @@ pub(super) fn plot(cases: &[Case], report: &Report) -> String {
     let curve = |least: f64, colour| {
         let chosen: Vec<_> = cases.iter().filter(|case| case.share >= least).collect();
         let mut errors: Vec<_> = chosen.iter().filter_map(|case| case.relative()).collect();
-        errors.sort_by(f64::total_cmp);
+        order::ascending(&mut errors);
         let count = chosen.len().max(1) as f64;
         let steps = errors.iter().zip(1..).map(|(error, number)| [*error, f64::from(number) / count]);
         Curve { points: std::iter::once([0.0, 0.0]).chain(steps).collect(), colour, dashed: false }

@@ -13,6 +13,7 @@ use super::towers::CORNER_NOISE_PX;
 use crate::command::CommandError;
 use crate::correspond::automatic;
 use crate::engine::FRAME_SIDE;
+use crate::order;
 use crate::picture::read_gray;
 
 /// Pictures of the set with cameras.
@@ -159,7 +160,7 @@ pub(super) fn with_planes(folder: &Path, count: usize) -> Result<Vec<Pair>, Comm
         let name = entry?.file_name().to_string_lossy().into_owned();
         names.extend(name.strip_suffix("_planes.json").map(str::to_owned));
     }
-    names.sort();
+    order::sort(&mut names);
     let mut pairs = Vec::new();
     for name in names {
         let path = gt.join(format!("{name}_planes.json"));
@@ -205,7 +206,7 @@ fn plane(marks: &Marks, number: usize, first: &Photo, second: &Photo) -> Option<
             libm::sqrt(dx * dx + dy * dy)
         })
         .collect();
-    misses.sort_by(f64::total_cmp);
+    order::ascending(&mut misses);
     let corners: Vec<ImagePoint> = pairs
         .iter()
         .map(|pair| {
