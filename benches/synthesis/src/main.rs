@@ -7,6 +7,9 @@
 #[allow(dead_code, reason = "the bench times the search, and takes nothing else of the file")]
 #[path = "../../../runner-linux/src/classify/nearest.rs"]
 mod nearest;
+#[allow(dead_code, reason = "as above")]
+#[path = "../../../runner-linux/src/parallel.rs"]
+mod parallel;
 
 use std::hint::black_box;
 use std::time::Instant;
