@@ -7,6 +7,7 @@ use crate::kernel::Kernels;
 use crate::math::{self, log2_q8};
 use crate::model::EVIDENCE;
 use crate::pyramid::scale;
+use crate::query::CROWD_RADIUS;
 use crate::refine::{Pairing, Refined, fitting_levels};
 use crate::transform::Shape;
 
@@ -17,7 +18,7 @@ const LEVEL_WEIGHT: [i32; 5] = [20, 20, 14, 10, 7];
 /// A corner that should be seen, and nothing is: -0.3 bit.
 const MISSING: i32 = -48;
 /// A corner is looked for within this, in pixels.
-pub const RADIUS: f32 = 10.0;
+pub const RADIUS: f32 = CROWD_RADIUS;
 /// Cells of the stored view along each side of a square over its longer side.
 const CELLS: usize = 6;
 /// Evidence of a cell beyond this counts three tenths: 12 bits.
@@ -68,9 +69,11 @@ pub fn weigh<K: Kernels + ?Sized, const QUERY: usize, const CORNERS: usize>(
     corners: &mut Vec<CornerEvidence, CORNERS>,
 ) -> i32 {
     corners.clear();
+    let mut owned = [0; OWNED_WORDS];
     let fitting = fitting_levels(refined.shape.scale);
     let (width, height) = (f32::from(pairing.query.width), f32::from(pairing.query.height));
     let count_bits = log2_q8(pairing.query.len() as u32);
+    let ordinary = ordinary_rank(pairing.query.len() as u32);
     let stored_corners = pairing.stored.positions.iter().zip(pairing.stored.levels).zip(pairing.stored.commonness);
     for (number, ((position, &level), &commonness)) in stored_corners.enumerate() {
         let [x, y] = refined.frame_from_view.apply(position.to_pixels());
@@ -95,33 +98,50 @@ pub fn weigh<K: Kernels + ?Sized, const QUERY: usize, const CORNERS: usize>(
             continue;
         }
         let (distance, query) = best;
+        let nearer = kernels.count_below(row, distance);
+        // Most corners of a wrong map end here: whatever of the nearer ones is here, too many are elsewhere.
+        if nearer >= ordinary.saturating_add(pairing.index.crowd()) {
+            enter(corners, &mut owned, CornerEvidence { stored, query: Some(query), evidence: 0 });
+            continue;
+        }
         let near_bits = log2_q8(near);
-        let rank_bits = log2_q8(1 + rank(kernels, pairing, row, distance, query));
+        let rank_bits = log2_q8(1 + nearer.saturating_sub(nearer_here(pairing, row, distance, query)));
         let surprise = i32::from(surprise(distance)) * 32;
         let a = ((surprise - near_bits - i32::from(commonness) * 256) >> 8).clamp(0, 15) as usize;
         let b = ((count_bits - rank_bits - near_bits) >> 8).clamp(0, 9) as usize;
         let eighths = EVIDENCE.get(a).and_then(|row| row.get(b)).map_or(0, |&e| i32::from(e));
         let evidence = eighths * LEVEL_WEIGHT.get(usize::from(level)).copied().unwrap_or(0);
-        enter(corners, CornerEvidence { stored, query: Some(query), evidence });
+        enter(corners, &mut owned, CornerEvidence { stored, query: Some(query), evidence });
     }
     sum_by_cell(pairing, corners)
 }
 
-/// Corners of the frame that are nearer in signature and lie elsewhere: farther than the radius from the match.
-fn rank<K: Kernels + ?Sized, const QUERY: usize>(
-    kernels: &K,
-    pairing: &Pairing<'_, QUERY>,
-    row: &[u8],
-    distance: u8,
-    query: u16,
-) -> u32 {
-    let nearer = kernels.count_below(row, distance);
-    let Some(place) = pairing.query.positions.get(usize::from(query)) else { return nearer };
+/// The least rank in a frame of `count` corners that says nothing, whatever the distance: the first four columns of the table
+/// are zero.
+fn ordinary_rank(count: u32) -> u32 {
+    const _: () = {
+        let mut row = 0;
+        while row < EVIDENCE.len() {
+            let [a, b, c, d, ..] = EVIDENCE[row];
+            assert!(a == 0 && b == 0 && c == 0 && d == 0);
+            row += 1;
+        }
+    };
+    let mut rank = count / 16;
+    while log2_q8(count) - log2_q8(1 + rank) >= 4 << 8 {
+        rank += 1;
+    }
+    rank
+}
+
+/// Corners of the frame that are nearer in signature and lie within the radius of the match; the others are its rank.
+fn nearer_here<const QUERY: usize>(pairing: &Pairing<'_, QUERY>, row: &[u8], distance: u8, query: u16) -> u32 {
+    let Some(place) = pairing.query.positions.get(usize::from(query)) else { return 0 };
     let mut here = 0;
     pairing.index.within(place.to_pixels(), RADIUS, |other, _, _| {
         here += u32::from(row.get(usize::from(other)).is_some_and(|&other| other < distance));
     });
-    nearer.saturating_sub(here)
+    here
 }
 
 /// Whether a corner whose patch appears at this scale would be detected on some level: within 0.6 of a level.
@@ -130,9 +150,21 @@ fn is_expected(apparent_scale: f32) -> bool {
     (0.8137..=4.857).contains(&apparent_scale)
 }
 
-/// Adds a corner; if its query corner supports another already, the weaker of the two says nothing in favour.
-fn enter<const CORNERS: usize>(corners: &mut Vec<CornerEvidence, CORNERS>, mut new: CornerEvidence) {
-    if let Some(owner) = corners.iter_mut().find(|owner| owner.query == new.query) {
+/// Words of a set of query corners, by the last bits of their numbers.
+const OWNED_WORDS: usize = 4;
+
+/// Adds a corner; if its query corner supports another already, the weaker of the two says nothing in favour. `owned` has
+/// the bit of each query corner that supports one, and of others: only then it is looked for.
+fn enter<const CORNERS: usize>(
+    corners: &mut Vec<CornerEvidence, CORNERS>,
+    owned: &mut [u64; OWNED_WORDS],
+    mut new: CornerEvidence,
+) {
+    let place = new.query.map_or(0, usize::from);
+    let (word, bit) = (&mut owned[place / 64 % OWNED_WORDS], 1 << (place % 64));
+    if *word & bit == 0 {
+        *word |= bit;
+    } else if let Some(owner) = corners.iter_mut().find(|owner| owner.query == new.query) {
         if new.evidence <= owner.evidence {
             new.evidence = new.evidence.min(0);
             new.query = None;
@@ -157,4 +189,19 @@ fn sum_by_cell<const QUERY: usize>(pairing: &Pairing<'_, QUERY>, corners: &[Corn
     }
     let saturated = |&sum: &i32| if sum > CELL_FULL { CELL_FULL + (sum - CELL_FULL) * 3 / 10 } else { sum };
     cells.iter().flatten().map(saturated).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn beyond_the_ordinary_rank_no_corner_says_anything() {
+        for count in 1..=2_048 {
+            let column = |rank: u32| (log2_q8(count) - log2_q8(1 + rank)) >> 8;
+            let ordinary = ordinary_rank(count);
+            assert!((ordinary..=count).all(|rank| column(rank) < 4), "{count} corners");
+            assert!(ordinary == 0 || count < 16 || column(ordinary - 1) >= 4, "{count} corners");
+        }
+    }
 }

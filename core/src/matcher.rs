@@ -93,6 +93,10 @@ impl<const STORED: usize, const CANDIDATES: usize, const BLOCKS: usize> Matcher<
             let candidates = self.candidates.view();
             let refined = refine(kernels, &pairing, &self.shortlist, candidates, hypothesis, &mut self.pairs);
             let Some(refined) = refined else { continue };
+            // The hypothesis before had more support; with the same map, this one has less evidence.
+            if best.is_some_and(|best| (best.frame_from_view, best.shape) == (refined.frame_from_view, refined.shape)) {
+                continue;
+            }
             let corner_evidence = weigh(kernels, &pairing, &refined, &mut self.corners);
             let supporting_corners = self.corners.iter().filter(|corner| corner.evidence > 0).count() as u16;
             if supporting_corners < LEAST_SUPPORTING {

@@ -6,6 +6,8 @@ use crate::kernel::NUMBER_LIMIT;
 /// Cells across and down; a cell of a 640 x 480 frame is 40 px wide.
 const GRID: [usize; 2] = [16, 12];
 const CELLS: usize = GRID[0] * GRID[1];
+/// Radius of the discs of [`QueryIndex::crowd`], in pixels.
+pub const CROWD_RADIUS: f32 = 10.0;
 
 /// A query feature where it stands in the grid's order.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -21,6 +23,7 @@ pub struct QueryIndex<const FEATURES: usize> {
     placed: [Placed; FEATURES],
     starts: [u16; CELLS + 1],
     per_pixel: [f32; 2],
+    crowd: u32,
 }
 
 impl<const FEATURES: usize> QueryIndex<FEATURES> {
@@ -31,6 +34,7 @@ impl<const FEATURES: usize> QueryIndex<FEATURES> {
             placed: [Placed { position: [0.0; 2], number: 0, level: 0 }; FEATURES],
             starts: [0; CELLS + 1],
             per_pixel: [0.0; 2],
+            crowd: 0,
         }
     }
 
@@ -62,6 +66,30 @@ impl<const FEATURES: usize> QueryIndex<FEATURES> {
                 *place += 1;
             }
         }
+        self.crowd = self.most_within(CROWD_RADIUS);
+    }
+
+    /// At least as many features as lie in any disc of [`CROWD_RADIUS`].
+    pub const fn crowd(&self) -> u32 {
+        self.crowd
+    }
+
+    /// The features of the cells that a disc can touch, at most.
+    fn most_within(&self, radius: f32) -> u32 {
+        // The thousandth covers what the cells of its two ends were rounded by.
+        let [across, down] = self.per_pixel.map(|per_pixel| (2.0 * radius * per_pixel + 1e-3) as usize + 2);
+        let run = |row: usize, left: usize| {
+            let bound = |column: usize| self.starts.get(row * GRID[0] + column).map_or(0, |&start| u32::from(start));
+            bound((left + across).min(GRID[0])) - bound(left)
+        };
+        let mut most = 0;
+        for top in 0..GRID[1] {
+            for left in 0..GRID[0] {
+                let sum = (top..(top + down).min(GRID[1])).map(|row| run(row, left)).sum();
+                most = if sum > most { sum } else { most };
+            }
+        }
+        most
     }
 
     fn cell_along(&self, axis: usize, coordinate: f32) -> usize {
@@ -97,5 +125,46 @@ impl<const FEATURES: usize> QueryIndex<FEATURES> {
 impl<const FEATURES: usize> Default for QueryIndex<FEATURES> {
     fn default() -> Self {
         Self::new()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::feature::Signature;
+    use crate::point::ImagePoint;
+
+    #[test]
+    fn no_disc_holds_more_than_the_crowd() {
+        let mut state = 7_u64;
+        let mut below = |limit: i32| {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            ((state >> 33) as i32) % limit
+        };
+        let (mut index, mut tightest) = (QueryIndex::<400>::new(), u32::MAX);
+        for (width, height) in [(640, 480), (320, 240), (97, 64), (24, 2_000)] {
+            // Half of them in one heap.
+            let positions: [ImagePoint; 400] = core::array::from_fn(|number| {
+                let (width, height) = if number % 2 == 0 { (width, height) } else { (width.min(60), height.min(50)) };
+                ImagePoint { x: below(width * 16), y: below(height * 16) }
+            });
+            let (width, height) = (width as u16, height as u16);
+            let rest = (&[0; 400], &[0; 400], &[Signature([0; 2]); 400]);
+            index.arrange(Features {
+                positions: &positions,
+                levels: rest.0,
+                commonness: rest.1,
+                signatures: rest.2,
+                width,
+                height,
+            });
+            for position in positions {
+                let mut found = 0;
+                index.within(position.to_pixels(), CROWD_RADIUS, |_, _, _| found += 1);
+                assert!(found <= index.crowd(), "{found} of {}", index.crowd());
+                tightest = tightest.min(index.crowd() - found);
+            }
+        }
+        assert!(tightest < 100, "the bound says something: {tightest}");
     }
 }

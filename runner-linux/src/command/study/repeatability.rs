@@ -242,7 +242,9 @@ fn of_photos(args: &Args) -> Result<Vec<Line>, CommandError> {
 fn together(pairs: &[Pair]) -> Result<Tally, CommandError> {
     let tallies = parallel::try_map_with(pairs, Matcher::default, |matcher, pair| pair.tally(matcher))?;
     let mut sum = Tally::default();
-    tallies.iter().for_each(|tally| sum.add(tally));
+    for tally in &tallies {
+        sum.add(tally);
+    }
     Ok(sum)
 }
 
