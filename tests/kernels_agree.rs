@@ -235,7 +235,7 @@ fn look_alikes_and_votes() {
             let search = Search { at, radius_squared: radius * radius, levels: random.below(32) as i32 };
             let blocks = &blocks[..round % 41];
             let key = Portable.closest(blocks, search);
-            assert_eq!(kernels.closest(blocks, search), key, "{name}, {search:?}");
+            assert_eq!(kernels.kernels().closest(blocks, search), key, "{name}, {search:?}");
             found += i32::from(key > 0);
 
             let n = round % 201;

@@ -91,7 +91,7 @@ mod tests {
     fn results_are_in_the_order_of_the_items() {
         let items: Vec<usize> = (0..10_000).rev().collect();
         assert_eq!(map(&items, |item| item * 2), items.iter().map(|item| item * 2).collect::<Vec<_>>());
-        assert_eq!(numbers(0, |number| number), []);
+        assert!(numbers(0, |number| number).is_empty());
     }
 
     #[test]
