@@ -7,7 +7,6 @@ use daymark::enroll::select::select_corners;
 use daymark::picture::{GrayImage, read_gray};
 use daymark::simd::Processor;
 use daymark::table_file::{LandmarkEntry, OwnedTable, ViewEntry};
-use daymark::with_kernels;
 use daymark_core::feature::Signature;
 use daymark_core::kernel::{
     BoxSums, Kernels, LANES, LookAlikes, PATCH, PATCH_STRIDE, Portable, Search, Seed, VoteColumns, places,
@@ -18,9 +17,8 @@ use daymark_core::verdict::FalseAnswer;
 use daymark_fixtures::{Lens, Tower, Trial, View};
 
 /// Kernel sets to compare with the portable one.
-fn others() -> Vec<(&'static str, Box<dyn Kernels>)> {
-    let boxed = |processor: Processor| -> Box<dyn Kernels> { with_kernels!(processor, kernels => Box::new(*kernels)) };
-    Processor::available().into_iter().map(|processor| (processor.name(), boxed(processor))).collect()
+fn others() -> Vec<(&'static str, Processor)> {
+    Processor::available().into_iter().map(|processor| (processor.name(), processor)).collect()
 }
 
 fn drawn(width: usize, height: usize, gray: impl Fn(usize, usize) -> u8) -> GrayImage {
@@ -94,9 +92,9 @@ fn rows_of_pixels_and_of_responses() {
             let size = (picture.width, picture.height);
             for rows in rows.windows(3) {
                 let rows = [rows[0], rows[1], rows[2]];
-                assert_eq!(pixel_rows(&*kernels, rows), pixel_rows(&Portable, rows), "{name}, {size:?}");
+                assert_eq!(pixel_rows(kernels.kernels(), rows), pixel_rows(&Portable, rows), "{name}, {size:?}");
             }
-            assert_eq!(responses(&*kernels, &rows), responses(&Portable, &rows), "{name}, {size:?}");
+            assert_eq!(responses(kernels.kernels(), &rows), responses(&Portable, &rows), "{name}, {size:?}");
         }
     }
 }
@@ -165,7 +163,7 @@ fn box_sums_of_patches() {
                     kernels.box_sums(&patch, &mut sums);
                     sums
                 };
-                assert_eq!(sums(&*kernels), sums(&Portable), "{name}, {} px from {start}", picture.width);
+                assert_eq!(sums(kernels.kernels()), sums(&Portable), "{name}, {} px from {start}", picture.width);
             }
         }
     }
@@ -185,14 +183,14 @@ fn rows_of_distances() {
                     kernels.distances(signature, others, &mut out);
                     out
                 };
-                let row = distances(&*kernels);
+                let row = distances(kernels.kernels());
                 assert_eq!(row, distances(&Portable), "{name}, {count} signatures");
-                assert_eq!(searches(&*kernels, &row), searches(&Portable, &row), "{name}, {count} distances");
+                assert_eq!(searches(kernels.kernels(), &row), searches(&Portable, &row), "{name}, {count} distances");
             }
             // Few values, so that many are equal; and every value that a byte has.
             for limit in [2, 5, 129, 256] {
                 let row = random.bytes(count, limit);
-                assert_eq!(searches(&*kernels, &row), searches(&Portable, &row), "{name}, {row:?}");
+                assert_eq!(searches(kernels.kernels(), &row), searches(&Portable, &row), "{name}, {row:?}");
             }
         }
     }
@@ -237,7 +235,7 @@ fn look_alikes_and_votes() {
             let search = Search { at, radius_squared: radius * radius, levels: random.below(32) as i32 };
             let blocks = &blocks[..round % 41];
             let key = Portable.closest(blocks, search);
-            assert_eq!(kernels.closest(blocks, search), key, "{name}, {search:?}");
+            assert_eq!(kernels.kernels().closest(blocks, search), key, "{name}, {search:?}");
             found += i32::from(key > 0);
 
             let n = round % 201;
@@ -256,7 +254,7 @@ fn look_alikes_and_votes() {
                 let mut agrees = vec![9; n];
                 (kernels.votes(seed, columns, &mut agrees), agrees)
             };
-            assert_eq!(votes(&*kernels), votes(&Portable), "{name}, {seed:?}");
+            assert_eq!(votes(kernels.kernels()), votes(&Portable), "{name}, {seed:?}");
             agreed += votes(&Portable).0;
         }
     }
@@ -265,7 +263,7 @@ fn look_alikes_and_votes() {
 
 /// The corners that enrollment keeps, with each kernel set; all the same.
 fn enrolled(picture: &GrayImage, profile: Profile) -> ViewEntry {
-    let select = |processor: Processor| with_kernels!(processor, kernels => select_corners(kernels, picture, selection(profile)));
+    let select = |processor: Processor| select_corners(processor, picture, selection(profile));
     let features = select(Processor::Portable);
     for processor in Processor::available() {
         assert!(select(processor) == features, "{}: enrollment differs", processor.name());

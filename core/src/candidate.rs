@@ -116,7 +116,13 @@ impl<const CANDIDATES: usize> Candidates<CANDIDATES> {
     ///
     /// `distances` holds a row of `query.len()` distances for each stored corner. Ties: stored corner, then query
     /// corner, in their order.
-    pub fn collect<K: Kernels>(&mut self, kernels: &K, stored: Features<'_>, query: Features<'_>, distances: &[u8]) {
+    pub fn collect<K: Kernels + ?Sized>(
+        &mut self,
+        kernels: &K,
+        stored: Features<'_>,
+        query: Features<'_>,
+        distances: &[u8],
+    ) {
         self.order.clear();
         let rows = distances.chunks_exact(query.len().max(1)).zip(stored.commonness).enumerate();
         for (number, (row, &commonness)) in rows {

@@ -97,7 +97,7 @@ impl<const STRIP: usize, const SLOTS: usize> CornerDetector<STRIP, SLOTS> {
 
     /// Calls `emit` with at most `count` corners of the level: at most `share` of each cell first, then the strongest
     /// of those that are left. They come cell by cell, the strongest first.
-    pub fn detect<K: Kernels>(
+    pub fn detect<K: Kernels + ?Sized>(
         &mut self,
         kernels: &K,
         level: GrayView<'_>,
@@ -121,7 +121,7 @@ impl<const STRIP: usize, const SLOTS: usize> CornerDetector<STRIP, SLOTS> {
     }
 
     /// Finds the peaks of the columns `first..end` in one pass down the level.
-    fn sweep<K: Kernels>(&mut self, kernels: &K, level: GrayView<'_>, first: usize, end: usize) {
+    fn sweep<K: Kernels + ?Sized>(&mut self, kernels: &K, level: GrayView<'_>, first: usize, end: usize) {
         let columns = end - first + 2 * PEAK_REACH;
         self.rows.start(columns);
         let pixels = |y: usize| level.row(y).get(first - BORDER..end + BORDER).unwrap_or(&[]);

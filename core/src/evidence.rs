@@ -62,7 +62,7 @@ pub struct CornerEvidence {
 /// of the frame's `n` corners elsewhere are nearer than `d`. The rank devalues windows that match everywhere. The
 /// table of `model.rs` turns `a` and `b` into bits. A query corner supports one stored corner only. The sum over each
 /// of 6 x 6 cells of the view saturates, so that one sign or tree cannot carry the answer.
-pub fn weigh<K: Kernels, const QUERY: usize, const CORNERS: usize>(
+pub fn weigh<K: Kernels + ?Sized, const QUERY: usize, const CORNERS: usize>(
     kernels: &K,
     pairing: &Pairing<'_, QUERY>,
     refined: &Refined,

@@ -174,7 +174,7 @@ impl<const STRIP: usize, const SLOTS: usize> Extractor<STRIP, SLOTS> {
     ///
     /// # Errors
     /// [`FrameError::ScratchTooSmall`]; `features` is empty then.
-    pub fn extract<K: Kernels, const FEATURES: usize>(
+    pub fn extract<K: Kernels + ?Sized, const FEATURES: usize>(
         &mut self,
         kernels: &K,
         frame: TonedFrame<'_>,
@@ -206,7 +206,7 @@ impl<const STRIP: usize, const SLOTS: usize> Extractor<STRIP, SLOTS> {
     ///
     /// # Errors
     /// [`FrameError::ScratchTooSmall`].
-    pub fn count_corners<K: Kernels>(
+    pub fn count_corners<K: Kernels + ?Sized>(
         &mut self,
         kernels: &K,
         frame: TonedFrame<'_>,

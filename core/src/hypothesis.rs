@@ -31,7 +31,7 @@ pub struct Hypothesis {
 /// A source of hypotheses. Signatures vote below; other sources (nested hulls, local arrangements) join with it.
 pub trait HypothesisSource {
     /// Adds hypotheses for one stored view of `view_size` px to the list.
-    fn propose<K: Kernels>(
+    fn propose<K: Kernels + ?Sized>(
         &mut self,
         kernels: &K,
         candidates: CandidateView<'_>,
@@ -144,7 +144,7 @@ impl<const CANDIDATES: usize> Default for SignatureVotes<CANDIDATES> {
 }
 
 impl<const CANDIDATES: usize> HypothesisSource for SignatureVotes<CANDIDATES> {
-    fn propose<K: Kernels>(
+    fn propose<K: Kernels + ?Sized>(
         &mut self,
         kernels: &K,
         candidates: CandidateView<'_>,

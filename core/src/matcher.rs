@@ -67,7 +67,7 @@ impl<const STORED: usize, const CANDIDATES: usize, const BLOCKS: usize> Matcher<
     ///
     /// `distances` is scratch memory of at least `stored.len() * query.len()` bytes; with less, the last stored corners
     /// are left out.
-    pub fn match_view<K: Kernels, const QUERY: usize>(
+    pub fn match_view<K: Kernels + ?Sized, const QUERY: usize>(
         &mut self,
         kernels: &K,
         stored: Features<'_>,

@@ -44,7 +44,7 @@ pub fn base_from_level(level: u8, x: i32, y: i32) -> ImagePoint {
 ///
 /// # Errors
 /// [`FrameError::ScratchTooSmall`] if `scratch` has fewer than [`level_bytes`]; then nothing was visited.
-pub fn visit_levels<K: Kernels>(
+pub fn visit_levels<K: Kernels + ?Sized>(
     kernels: &K,
     frame: GrayView<'_>,
     scratch: &mut [u8],
@@ -75,7 +75,7 @@ const ROWS: [(usize, [u16; 3]); 5] = [(0, [5, 2, 0]), (1, [3, 4, 0]), (2, [1, 5,
 
 /// Writes the frame shrunk 7:5 and returns its size. Columns and rows that do not fill a group of seven give as many
 /// outputs as fit.
-fn shrink_seven_to_five<K: Kernels>(kernels: &K, frame: GrayView<'_>, out: &mut [u8]) -> (usize, usize) {
+fn shrink_seven_to_five<K: Kernels + ?Sized>(kernels: &K, frame: GrayView<'_>, out: &mut [u8]) -> (usize, usize) {
     let (width, height) = (frame.width() * 5 / 7, frame.height() * 5 / 7);
     if width == 0 {
         return (0, height);
@@ -110,7 +110,7 @@ fn shrink_seven_to_five<K: Kernels>(kernels: &K, frame: GrayView<'_>, out: &mut 
 }
 
 /// Writes the 2 x 2 averages of the frame and returns their size.
-fn halve<K: Kernels>(kernels: &K, frame: GrayView<'_>, out: &mut [u8]) -> (usize, usize) {
+fn halve<K: Kernels + ?Sized>(kernels: &K, frame: GrayView<'_>, out: &mut [u8]) -> (usize, usize) {
     let (width, height) = (frame.width() / 2, frame.height() / 2);
     if width == 0 {
         return (0, height);
@@ -122,7 +122,7 @@ fn halve<K: Kernels>(kernels: &K, frame: GrayView<'_>, out: &mut [u8]) -> (usize
 }
 
 /// Replaces an image by its 2 x 2 averages, packed at the front of the same buffer.
-fn halve_in_place<K: Kernels>(kernels: &K, image: &mut [u8], width: usize, height: usize) {
+fn halve_in_place<K: Kernels + ?Sized>(kernels: &K, image: &mut [u8], width: usize, height: usize) {
     let half = width / 2;
     for y in 0..height / 2 {
         // Output row y ends at or before input row 2 y begins, except for the first.

@@ -36,7 +36,7 @@ impl<const STORED: usize, const CANDIDATES: usize, const BLOCKS: usize, const QU
     ///
     /// # Errors
     /// What the table's source says; a frame without an answer is not an error.
-    pub fn recognize<K: Kernels, S: ViewSource>(
+    pub fn recognize<K: Kernels + ?Sized, S: ViewSource>(
         &mut self,
         kernels: &K,
         frame: Features<'_>,
@@ -61,7 +61,7 @@ impl<const STORED: usize, const CANDIDATES: usize, const BLOCKS: usize, const QU
     }
 
     /// Matches one view again, for an explanation: its match and what each stored corner said.
-    pub fn explain<K: Kernels>(
+    pub fn explain<K: Kernels + ?Sized>(
         &mut self,
         kernels: &K,
         frame: Features<'_>,
@@ -73,7 +73,7 @@ impl<const STORED: usize, const CANDIDATES: usize, const BLOCKS: usize, const QU
         Some((matched, self.matcher.latest_corners()))
     }
 
-    fn compare<K: Kernels>(
+    fn compare<K: Kernels + ?Sized>(
         &mut self,
         kernels: &K,
         frame: Features<'_>,

@@ -77,7 +77,7 @@ pub struct Refined {
 /// Refines a hypothesis; `None` if it loses its pairs or becomes a map that no camera sees.
 ///
 /// `pairs` is working memory. Cost: four rounds of one lookup for each stored corner.
-pub fn refine<K: Kernels, const QUERY: usize, const STORED: usize, const BLOCKS: usize, const PAIRS: usize>(
+pub fn refine<K: Kernels + ?Sized, const QUERY: usize, const STORED: usize, const BLOCKS: usize, const PAIRS: usize>(
     kernels: &K,
     pairing: &Pairing<'_, QUERY>,
     shortlist: &Shortlist<STORED, BLOCKS>,
@@ -147,7 +147,13 @@ fn squared_distance(a: [f32; 2], b: [f32; 2]) -> f32 {
 }
 
 /// For every stored corner the query corner within the radius that gains most for its closeness.
-fn guided_pairs<K: Kernels, const QUERY: usize, const STORED: usize, const BLOCKS: usize, const PAIRS: usize>(
+fn guided_pairs<
+    K: Kernels + ?Sized,
+    const QUERY: usize,
+    const STORED: usize,
+    const BLOCKS: usize,
+    const PAIRS: usize,
+>(
     kernels: &K,
     pairing: &Pairing<'_, QUERY>,
     shortlist: &Shortlist<STORED, BLOCKS>,

@@ -58,7 +58,7 @@ impl<const STRIP: usize> ResponseRows<STRIP> {
     /// Takes the next image row, given with its neighbours above and below: `columns + 6` pixels each, beginning
     /// three columns before the strip. Returns whether a row of the response became complete; it belongs to the image
     /// row two above the middle one.
-    pub fn push<K: Kernels>(&mut self, kernels: &K, rows: [&[u8]; 3]) -> bool {
+    pub fn push<K: Kernels + ?Sized>(&mut self, kernels: &K, rows: [&[u8]; 3]) -> bool {
         let n = self.columns;
         if let Some(tensor) = self.tensor.get_mut(self.pushed % TENSOR_ROWS) {
             let gradients = self.gradients.each_mut().map(|part| part.get_mut(..n + GRADIENT_HALO).unwrap_or_default());

@@ -28,7 +28,7 @@ impl<const STORED: usize, const BLOCKS: usize> Shortlist<STORED, BLOCKS> {
     }
 
     /// Lists the corners of the frame for as many stored corners as there is room.
-    pub fn fill<K: Kernels, const QUERY: usize>(&mut self, kernels: &K, pairing: &Pairing<'_, QUERY>) {
+    pub fn fill<K: Kernels + ?Sized, const QUERY: usize>(&mut self, kernels: &K, pairing: &Pairing<'_, QUERY>) {
         self.ends.clear();
         let mut end = 0;
         let mut marks = [0; (NUMBER_LIMIT as usize + 1) / 64];

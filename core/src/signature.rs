@@ -52,7 +52,7 @@ impl Default for SignatureScratch {
 }
 
 /// The signature of the pixel `column`, `row` of a level. Pixels beyond the border repeat the border.
-pub fn describe<K: Kernels>(
+pub fn describe<K: Kernels + ?Sized>(
     kernels: &K,
     level: GrayView<'_>,
     column: u16,

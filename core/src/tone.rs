@@ -17,7 +17,7 @@ impl<'a> TonedFrame<'a> {
     ///
     /// # Errors
     /// [`FrameError::ScratchTooSmall`] if `out` has fewer bytes than the frame pixels.
-    pub fn write<K: Kernels>(kernels: &K, frame: GrayView<'_>, out: &'a mut [u8]) -> Result<Self, FrameError> {
+    pub fn write<K: Kernels + ?Sized>(kernels: &K, frame: GrayView<'_>, out: &'a mut [u8]) -> Result<Self, FrameError> {
         let (width, height) = (frame.width(), frame.height());
         let (needed, found) = (width * height, out.len());
         let out = out.get_mut(..needed).ok_or(FrameError::ScratchTooSmall { needed, found })?;

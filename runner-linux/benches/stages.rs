@@ -2,12 +2,11 @@
 
 use std::sync::LazyLock;
 
-use daymark::engine::{Engine, STRIP};
+use daymark::engine::Engine;
 use daymark::enroll;
 use daymark::picture::GrayImage;
 use daymark::simd::Processor;
 use daymark::table_file::{LandmarkEntry, OwnedTable};
-use daymark::with_kernels;
 use daymark_core::corner::CornerDetector;
 use daymark_core::extract::{Extractor, FeatureSet, FrontEnd};
 use daymark_core::profile::Profile;
@@ -22,6 +21,8 @@ fn main() {
     divan::main();
 }
 
+/// Width of a strip of responses, as the engine has it.
+const STRIP: usize = 336;
 /// The most features that a stage is asked for.
 const MOST: FrontEnd = front_end(800);
 type WideExtractor = Extractor<STRIP, { MOST.slots() }>;
@@ -58,30 +59,34 @@ fn levels() -> Vec<u8> {
 #[divan::bench(args = names())]
 fn tone(bencher: Bencher<'_, '_>, name: &str) {
     let (frame, mut out) = (FRAME.view().expect("a frame"), vec![0; FRAME.pixels.len()]);
-    with_kernels!(processor(name), kernels => bencher.bench_local(|| {
-        TonedFrame::write(kernels, black_box(frame), &mut out).is_ok()
-    }));
+    let processor = processor(name);
+    let kernels = processor.kernels();
+    bencher.bench_local(|| TonedFrame::write(kernels, black_box(frame), &mut out).is_ok());
 }
 
 #[divan::bench(args = names())]
 fn pyramid(bencher: Bencher<'_, '_>, name: &str) {
     let (frame, mut levels) = (TONED.view().expect("a frame"), levels());
-    with_kernels!(processor(name), kernels => bencher.bench_local(|| {
+    let processor = processor(name);
+    let kernels = processor.kernels();
+    bencher.bench_local(|| {
         visit_levels(kernels, black_box(frame), &mut levels, |_, level| {
             black_box(level);
         })
-    }));
+    });
 }
 
 #[divan::bench(args = names())]
 fn corners_first_level(bencher: Bencher<'_, '_>, name: &str) {
     let frame = TONED.view().expect("a frame");
     let mut detector: Box<CornerDetector<STRIP, { MOST.slots() }>> = Box::default();
-    with_kernels!(processor(name), kernels => bencher.bench_local(|| {
+    let processor = processor(name);
+    let kernels = processor.kernels();
+    bencher.bench_local(|| {
         detector.detect(kernels, black_box(frame), MOST.level_count(0), MOST.cell_share(0), |corner| {
             black_box(corner);
         });
-    }));
+    });
 }
 
 #[divan::bench(args = names())]
@@ -89,9 +94,9 @@ fn corners_all_levels(bencher: Bencher<'_, '_>, name: &str) {
     let (mut pixels, mut levels) = (FRAME.pixels.clone(), levels());
     let frame = TonedFrame::in_place(&mut pixels, FRAME.width, FRAME.height, FRAME.width).expect("a frame");
     let mut extractor: Box<WideExtractor> = Box::default();
-    with_kernels!(processor(name), kernels => bencher.bench_local(|| {
-        extractor.count_corners(kernels, black_box(frame), front_end(600), &mut levels)
-    }));
+    let processor = processor(name);
+    let kernels = processor.kernels();
+    bencher.bench_local(|| extractor.count_corners(kernels, black_box(frame), front_end(600), &mut levels));
 }
 
 #[divan::bench(args = names(), consts = [600, 800])]
@@ -99,10 +104,12 @@ fn features<const COUNT: u16>(bencher: Bencher<'_, '_>, name: &str) {
     let (frame, mut toned, mut levels) = (FRAME.view().expect("a frame"), vec![0; FRAME.pixels.len()], levels());
     let mut extractor: Box<WideExtractor> = Box::default();
     let mut features: Box<FeatureSet<800>> = Box::default();
-    with_kernels!(processor(name), kernels => bencher.bench_local(|| {
+    let processor = processor(name);
+    let kernels = processor.kernels();
+    bencher.bench_local(|| {
         let toned = TonedFrame::write(kernels, black_box(frame), &mut toned).expect("enough memory");
         extractor.extract(kernels, toned, front_end(COUNT), &mut levels, &mut features)
-    }));
+    });
 }
 
 /// A table with one view, of the tower that the frame shows or of another.
