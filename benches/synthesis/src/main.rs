@@ -6,8 +6,8 @@
 use std::hint::black_box;
 use std::time::Instant;
 
-use daymark::classify::nearest::NearestPoints;
 use daymark_core::camera::triangulate::{Pinhole, Sighting, StereoPair, triangulate};
+use daymark_numerics::nearest::NearestPoints;
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use spade::{DelaunayTriangulation, Point2, Triangulation};
 

@@ -2,8 +2,8 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::nearest::NearestPoints;
 use crate::synthesize::dense::DenseCloud;
+use daymark_numerics::nearest::NearestPoints;
 
 /// Points of a model with what is known of each.
 #[derive(Debug, Clone)]

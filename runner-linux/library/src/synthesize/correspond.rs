@@ -1,12 +1,13 @@
 //! Which features of which views are the same point: look-alikes, checked by epipolar geometry, joined to tracks.
 
+use daymark_numerics::epipolar::{Estimate, Pair, RelativePose, relative_pose};
+use daymark_numerics::look_alike::{ViewFeatures, guided_matches, mutual_matches};
 use serde::Serialize;
 
-use super::epipolar::{Estimate, Pair, RelativePose, relative_pose};
 use super::explain::{Explained, LeftOut, Reason};
 use super::factorize::affine_inliers;
-use super::features::{ViewFeatures, guided_matches, mutual_matches};
 use super::view::{Station, Track, View};
+use crate::camera_file::lens::Lens;
 use crate::parallel;
 
 /// Distance from the epipolar line within which a match is right, pixels of the working size.
@@ -126,19 +127,18 @@ fn matched([a, b]: [usize; 2], views: &[View], features: &[ViewFeatures], geomet
         .collect();
     // With the geometry known, look-alikes that were not clear before may be now.
     let limit = threshold * threshold;
-    let lines = estimate.pose.lines(
-        one.ideal.iter().map(|&at| left.normalized_from_ideal(at)),
-        other.ideal.iter().map(|&at| right.normalized_from_ideal(at)),
-    );
-    // What has no direction is NaN, and not below.
-    for pair in guided_matches(one, other, &matches, |a, b| lines.squared_distance(a, b) < limit) {
+    let all = |lens: &Lens, ideal: &[[f64; 2]]| -> Vec<[f64; 2]> {
+        ideal.iter().map(|&at| lens.normalized_from_ideal(at)).collect()
+    };
+    let lines = estimate.pose.lines(&all(left, &one.ideal), &all(right, &other.ideal));
+    for pair in guided_matches(one, other, &matches, &lines, limit) {
         if estimate.pose.depths(&direction(pair)).is_some_and(|[a, b]| a > 0.0 && b > 0.0) {
             matches.push(pair);
         }
     }
     let refined: Vec<Pair> = matches.iter().map(|&pair| direction(pair)).collect();
     if matches!(geometry, Geometry::Lenses) {
-        estimate.pose = estimate.pose.refined(&refined.iter(), threshold / 2.0, 10);
+        estimate.pose = estimate.pose.refined(&refined, threshold / 2.0, 10);
     }
     PairMatches { views: [a, b], alike: alike.len(), agreeing, matches, estimate: Some(estimate), left_out }
 }

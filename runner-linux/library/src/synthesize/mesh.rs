@@ -7,12 +7,12 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use daymark_numerics::cells::{Cells, bounds};
 use nalgebra::Vector3;
 use serde::Serialize;
 use spade::handles::FixedVertexHandle;
 use spade::{DelaunayTriangulation, HasPosition, Point2, Triangulation};
 
-use super::cells::{Cells, bounds};
 use super::view::{Station, Surface, Vertex};
 use crate::order;
 use crate::parallel;

@@ -1,6 +1,7 @@
 //! Which view shows each triangle best, and the intensities that it gives.
 
-use super::render::DepthBuffer;
+use daymark_numerics::depth::DepthBuffer;
+
 use super::view::{Station, Surface, View};
 use crate::parallel;
 

@@ -55,16 +55,13 @@ impl RelativePose {
     }
 
     /// The epipolar lines of many directions of both views, for pairs among them.
-    pub fn lines(
-        &self,
-        first: impl Iterator<Item = [f64; 2]>,
-        second: impl Iterator<Item = [f64; 2]>,
-    ) -> EpipolarLines {
+    pub fn lines(&self, first: &[[f64; 2]], second: &[[f64; 2]]) -> EpipolarLines {
         let essential = self.essential();
         EpipolarLines {
-            of_first: first.map(|at| essential * homogeneous(at)).collect(),
+            of_first: first.iter().map(|&at| essential * homogeneous(at)).collect(),
             of_second: second
-                .map(|at| {
+                .iter()
+                .map(|&at| {
                     let line = essential.tr_mul(&homogeneous(at));
                     (at, line.x * line.x, line.y * line.y)
                 })
@@ -152,7 +149,11 @@ impl RelativePose {
 
     /// Robust least squares over these pairs; `scale` is where pairs begin to fade.
     #[must_use]
-    pub fn refined<'p>(mut self, pairs: &(impl Iterator<Item = &'p Pair> + Clone), scale: f64, steps: usize) -> Self {
+    pub fn refined(self, pairs: &[Pair], scale: f64, steps: usize) -> Self {
+        self.refined_over(&pairs.iter(), scale, steps)
+    }
+
+    fn refined_over<'p>(mut self, pairs: &(impl Iterator<Item = &'p Pair> + Clone), scale: f64, steps: usize) -> Self {
         for _ in 0..steps {
             let Some((next, length)) = self.step(pairs.clone(), scale) else { break };
             self = next;
@@ -250,7 +251,7 @@ pub fn relative_pose(pairs: &[Pair], threshold: f64, seed: u64) -> Option<Estima
             let rotation = known.map_or(Matrix3::identity(), |pose| pose.rotation);
             let mut pose = RelativePose { rotation, direction: start.normalize() };
             let five = || sample.iter().map(|&number| &pairs[number]);
-            pose = pose.refined(&five(), 1e3, STEPS);
+            pose = pose.refined_over(&five(), 1e3, STEPS);
             if five().any(|pair| !(pose.squared_distance(pair) < 1e-4 * limit)) {
                 continue;
             }
@@ -262,7 +263,7 @@ pub fn relative_pose(pairs: &[Pair], threshold: f64, seed: u64) -> Option<Estima
             best = Some((pose, now));
             for _ in 0..3 {
                 let inliers = inliers_of(&pose);
-                let refined = pose.refined(&inliers.iter().map(|&number| &pairs[number]), threshold, 6);
+                let refined = pose.refined_over(&inliers.iter().map(|&number| &pairs[number]), threshold, 6);
                 let least = best.map_or(f64::INFINITY, |best| best.1);
                 let lower = cost(&refined, least);
                 if lower >= least {
