@@ -11,3 +11,5 @@ pub mod order;
 pub mod parallel;
 pub mod pose;
 pub mod sample;
+pub mod sights;
+pub mod dense;
