@@ -94,27 +94,29 @@ pub fn guided_matches(
     for &[a, b] in known {
         (left[a as usize], right[b as usize]) = (true, true);
     }
-    // What is left of the second view, side by side.
-    let rest: Vec<usize> = (0..right.len()).filter(|&b| !right[b]).collect();
-    let signatures: Vec<Signature> = rest.iter().map(|&b| second.signatures[b]).collect();
+    // What is left of the second view, side by side in the order of height: a line meets a part of it.
+    let by_height = lines.by_height((0..right.len()).filter(|&b| !right[b]));
+    let signatures: Vec<Signature> = by_height.numbers.iter().map(|&b| second.signatures[b as usize]).collect();
     let mut found: Vec<(u8, [u32; 2])> = Vec::new();
     let processor = Processor::detect();
     let kernels = processor.kernels();
-    let Row { mut distances, mut marks } = Row::new(rest.len());
+    let Row { mut distances, mut marks } = Row::new(signatures.len());
     for (a, signature) in first.signatures.iter().enumerate().filter(|(a, _)| !left[*a]) {
-        kernels.distances(*signature, &signatures, &mut distances);
+        let part = lines.near(a, &by_height, limit);
+        let rest = &by_height.numbers[part.clone()];
+        let (distances, marks) = (&mut distances[..rest.len()], &mut marks[..rest.len().div_ceil(64)]);
+        kernels.distances(*signature, &signatures[part], distances);
         // Most have nothing that is near enough: their rivals need not be looked at.
-        kernels.marks_at_most(&distances, MAX_GUIDED_BITS, &mut marks);
-        let allowed = places(&marks).filter(|&place| near(a, rest[place]));
+        kernels.marks_at_most(distances, MAX_GUIDED_BITS, marks);
+        let allowed = places(marks).filter(|&place| near(a, rest[place] as usize));
         let Some((least, best)) = allowed.map(|place| (distances[place], rest[place])).min() else { continue };
-        kernels.marks_at_most(&distances, MAX_RIVAL_BITS, &mut marks);
-        let rivals = places(&marks).filter(|&place| {
+        kernels.marks_at_most(distances, MAX_RIVAL_BITS, marks);
+        let mut rivals = places(marks).filter(|&place| {
             u32::from(least) * 100 > u32::from(distances[place]) * GUIDED_RATIO_PERCENT
-                && elsewhere(second.points[rest[place]], second.points[best])
+                && elsewhere(second.points[rest[place] as usize], second.points[best as usize])
         });
-        let mut rivals = rivals.map(|place| rest[place]);
-        if !rivals.any(|rival| near(a, rival)) {
-            found.push((least, [a as u32, best as u32]));
+        if !rivals.any(|rival| near(a, rest[rival] as usize)) {
+            found.push((least, [a as u32, best]));
         }
     }
     // One to one, the best first.

@@ -1,5 +1,6 @@
 //! Which features of which views are the same point: look-alikes, checked by epipolar geometry, joined to tracks.
 
+use daymark_numerics::align::{Aligner, smoothed};
 use daymark_numerics::epipolar::{Estimate, Pair, RelativePose, relative_pose};
 use daymark_numerics::look_alike::{ViewFeatures, guided_matches, mutual_matches};
 use serde::Serialize;
@@ -221,6 +222,28 @@ pub fn tracks_explained(features: &[ViewFeatures], pairs: &[PairMatches]) -> (Ve
     removed.contradicting_tracks = contradicting.len();
     explained.extend(contradicting.len(), contradicting.into_iter());
     (tracks, removed, explained)
+}
+
+/// Moves the sightings of each track to where their pictures show what the first one does, as far as that can be told.
+pub fn align(views: &[View], tracks: &mut [Track]) {
+    let aligner = Aligner::default();
+    let smooth = parallel::map(views, |view| smoothed(&view.gray));
+    let aligned = parallel::map(tracks, |track| {
+        let mut sightings = track.sightings.clone();
+        let Some((&mut (first, at), others)) = sightings.split_first_mut() else { return sightings };
+        let Some(patch) = aligner.patch(&smooth[first], views[first].lens.picture_from_ideal(at)) else {
+            return sightings;
+        };
+        for (number, at) in others {
+            let view = &views[*number];
+            let found = patch.found_in(&smooth[*number], view.lens.picture_from_ideal(*at));
+            *at = found.and_then(|found| view.lens.ideal_from_picture(found)).unwrap_or(*at);
+        }
+        sightings
+    });
+    for (track, sightings) in tracks.iter_mut().zip(aligned) {
+        track.sightings = sightings;
+    }
 }
 
 fn root(parent: &mut [usize], mut node: usize) -> usize {

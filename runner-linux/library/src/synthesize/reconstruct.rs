@@ -229,7 +229,8 @@ fn correspondences(views: &[View], geometry: Geometry<'_>, corners: &Corners) ->
                 features(view).map_err(|error| NoModel::Picture(format!("{}: {error}", view.name)))
             })?;
             let pairs = correspond::pairs(views, &found, geometry);
-            let (tracks, removed, explained) = correspond::tracks_explained(&found, &pairs);
+            let (mut tracks, removed, explained) = correspond::tracks_explained(&found, &pairs);
+            correspond::align(views, &mut tracks);
             Ok((pairs, tracks, removed, explained))
         }
         Corners::Picked(corners) => {
