@@ -253,3 +253,31 @@ fn root(parent: &mut [usize], mut node: usize) -> usize {
     }
     node
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::classify::towers::{Conditions, TowerViews, TrueSurface};
+    use crate::synthesize::features::features;
+    use crate::synthesize::triangulate::{Rules, points};
+    use daymark_fixtures::{Light, Tower};
+
+    #[test]
+    fn aligned_corners_lie_nearer_to_the_surface() {
+        let tower = &Tower::eight()[0];
+        let conditions = Conditions { light: Light::morning(), seed: 301, farther: 1.0 };
+        let seen = TowerViews::new(tower, &[-8.0, 10.0], &conditions, false);
+        let surface = TrueSurface::new(tower);
+        let found: Vec<_> = seen.views().iter().map(|view| features(view).unwrap()).collect();
+        let matches = pairs(seen.views(), &found, Geometry::Known(seen.stations()));
+        let (mut tracks, _) = tracks(&found, &matches);
+        let median = |tracks: &[Track]| {
+            let (vertices, _) = points(tracks, seen.stations(), &Rules::default());
+            surface.distances(vertices.into_iter().map(|vertex| vertex.position))[0]
+        };
+        let before = median(&tracks);
+        align(seen.views(), &mut tracks);
+        let after = median(&tracks);
+        assert!(after < 0.6 * before, "{before} m, then {after} m");
+    }
+}
