@@ -7,7 +7,9 @@ use std::hint::black_box;
 use std::time::Instant;
 
 use daymark::classify::towers::{Conditions, TowerViews};
+use daymark::synthesize::correspond::{Geometry, pairs, tracks};
 use daymark::synthesize::dense::dense;
+use daymark::synthesize::features::features;
 use daymark::synthesize::model::Model;
 use daymark::synthesize::texture::best_views;
 use daymark::synthesize::triangulate::Rules;
@@ -108,7 +110,11 @@ fn texture() {
     let tower = &Tower::eight()[0];
     let conditions = Conditions { light: Light::morning(), seed: 51, farther: 1.0 };
     let seen = TowerViews::new(tower, &[-8.0, 10.0], &conditions, false);
-    let tracks: Vec<_> = seen.tracks(0.0, 1).into_iter().filter(|track| track.sightings.len() == 2).take(47).collect();
+    let found: Vec<_> = seen.views().iter().map(|view| features(view).expect("a picture")).collect();
+    let matches = pairs(seen.views(), &found, Geometry::Known(seen.stations()));
+    let (all, _) = tracks(&found, &matches);
+    // Spread over the picture, as people pick them.
+    let tracks: Vec<_> = all.iter().step_by(all.len() / 47).take(47).cloned().collect();
     let model = Model::new(seen.views(), seen.stations(), &tracks, &[[0, 1]], &Rules::default(), 0.0);
     let surface = &model.surface;
     println!("Surface for the texture: {} points, {} triangles", surface.vertices.len(), surface.triangles.len());

@@ -37,7 +37,7 @@ impl Cells {
         let mut cells = Self { origin, across, down, starts: vec![0; across * down + 1], numbers: Vec::new() };
         for &(_, rectangle) in entries {
             for row in cells.touched(rectangle) {
-                for count in &mut cells.starts[row.start + 1..row.end + 1] {
+                for count in &mut cells.starts[row.start + 1..=row.end] {
                     *count += 1;
                 }
             }
