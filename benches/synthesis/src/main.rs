@@ -6,8 +6,17 @@
 use std::hint::black_box;
 use std::time::Instant;
 
-use daymark::classify::nearest::NearestPoints;
+use daymark::classify::towers::{Conditions, TowerViews};
+use daymark::synthesize::correspond::{Geometry, pairs, tracks};
+use daymark::synthesize::dense::dense;
+use daymark::synthesize::features::features;
+use daymark::synthesize::model::Model;
+use daymark::synthesize::texture::best_views;
+use daymark::synthesize::triangulate::Rules;
 use daymark_core::camera::triangulate::{Pinhole, Sighting, StereoPair, triangulate};
+use daymark_core::mesh::SubdivisionLevel;
+use daymark_fixtures::{Light, Tower};
+use daymark_numerics::nearest::NearestPoints;
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use spade::{DelaunayTriangulation, Point2, Triangulation};
 
@@ -71,10 +80,7 @@ fn triangulation() {
         .map(|_| [10.0 * numbers.next() - 5.0, 10.0 * numbers.next() - 5.0, 12.0 * numbers.next()])
         .collect();
     let mut image = |camera: &Pinhole| -> Vec<[f64; 2]> {
-        points
-            .iter()
-            .map(|&point| camera.project(point).expect("in front").map(|c| c + numbers.next() - 0.5))
-            .collect()
+        points.iter().map(|&point| camera.project(point).expect("in front").map(|c| c + numbers.next() - 0.5)).collect()
     };
     let (left, right) = (image(&one), image(&other));
     let pair = StereoPair::new(&one, &other);
@@ -98,11 +104,36 @@ fn triangulation() {
     println!("Triangulation of 100,000       pair  {a:9.2} ms   least reprojection error with covariance {b:9.2} ms");
 }
 
+/// The texture of a surface of 47 corners, as the thesis had (6.3: 0.043 s): which view shows each triangle, then the points
+/// of a level of subdivision with their colours, and the mean of each triangle's three (6.2).
+fn texture() {
+    let tower = &Tower::eight()[0];
+    let conditions = Conditions { light: Light::morning(), seed: 51, farther: 1.0 };
+    let seen = TowerViews::new(tower, &[-8.0, 10.0], &conditions, false);
+    let found: Vec<_> = seen.views().iter().map(|view| features(view).expect("a picture")).collect();
+    let matches = pairs(seen.views(), &found, Geometry::Known(seen.stations()));
+    let (all, _) = tracks(&found, &matches);
+    // Spread over the picture, as people pick them.
+    let tracks: Vec<_> = all.iter().step_by(all.len() / 47).take(47).cloned().collect();
+    let model = Model::new(seen.views(), seen.stations(), &tracks, &[[0, 1]], &Rules::default(), 0.0);
+    let surface = &model.surface;
+    println!("Surface for the texture: {} points, {} triangles", surface.vertices.len(), surface.triangles.len());
+    for level in [SubdivisionLevel::ONE, SubdivisionLevel::FOUR, SubdivisionLevel::SEVEN] {
+        let mut patches = 0;
+        let mut own = || {
+            let shown = best_views(surface, seen.views(), seen.stations());
+            let cloud = dense(surface, level, seen.views(), seen.stations(), &shown).expect("a surface");
+            patches = cloud.triangles.len();
+            black_box(cloud.patch_colours().fold(0_u32, |sum, [r, ..]| sum.wrapping_add(u32::from(r))));
+        };
+        let [seconds] = least(5, [&mut own]);
+        println!("Texture to level {}             own  {:9.2} ms   {patches} patches", level.number(), seconds * 1e3);
+    }
+}
+
 fn nearest_points(count: usize, rounds: usize) {
     let mut numbers = Numbers(7);
-    let mut cloud = || -> Vec<[f32; 3]> {
-        (0..count).map(|_| [0; 3].map(|_| numbers.next() as f32)).collect()
-    };
+    let mut cloud = || -> Vec<[f32; 3]> { (0..count).map(|_| [0; 3].map(|_| numbers.next() as f32)).collect() };
     let (base, test) = (cloud(), cloud());
     let (mut ours, mut theirs) = (0.0, 0.0);
     let mut own = || {
@@ -116,16 +147,14 @@ fn nearest_points(count: usize, rounds: usize) {
     };
     let [a, b] = least(rounds, [&mut own, &mut kiddo]).map(|seconds| seconds * 1e3);
     assert!((ours - theirs).abs() <= 1e-5 * theirs, "{ours} against {theirs}");
-    println!(
-        "Nearest of {count:>9}, built too  own  {a:9.2} ms   kiddo      {b:9.2} ms   ratio {:.2}",
-        b / a
-    );
+    println!("Nearest of {count:>9}, built too  own  {a:9.2} ms   kiddo      {b:9.2} ms   ratio {:.2}", b / a);
 }
 
 fn main() {
     rayon::ThreadPoolBuilder::new().num_threads(1).build_global().expect("one thread");
     delaunay();
     triangulation();
+    texture();
     nearest_points(10_000, ROUNDS);
     nearest_points(1_000_000, 5);
 }

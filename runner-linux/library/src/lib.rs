@@ -16,6 +16,7 @@
 pub mod picture;
 mod cut_jpeg;
 pub use daymark_engine::{engine, simd};
+use daymark_numerics::{order, parallel};
 pub mod camera_file;
 pub mod lens_source;
 pub mod calibrate;
@@ -28,8 +29,6 @@ pub mod observer;
 pub mod near;
 pub mod dataset;
 mod calendar;
-mod parallel;
-mod order;
 mod log;
 pub mod frame;
 pub mod report;

@@ -1,7 +1,8 @@
 //! What a camera is, apart from its place: size, focal length, principal point, distortion; and its place.
 
 use daymark_core::camera::triangulate::Pinhole;
-use nalgebra::{Matrix3, Vector3};
+pub use daymark_numerics::pose::Pose;
+use nalgebra::Matrix3;
 
 use super::distortion::Distortion;
 
@@ -85,47 +86,16 @@ impl Lens {
         self.ideal_from_normalized(self.distortion.apply(self.normalized_from_ideal(pixel)))
     }
 
+    /// The camera without distortion in a place; `None` for a lens without focal length.
+    pub fn pinhole_at(&self, pose: &Pose) -> Option<Pinhole> {
+        let matrix = self.matrix() * pose.view_from_model;
+        let rows = [0, 1, 2].map(|row| [matrix[(row, 0)], matrix[(row, 1)], matrix[(row, 2)]]);
+        Pinhole::new(rows, pose.position.into())
+    }
+
     /// Whether a point of the picture lies on it.
     pub fn holds(&self, [x, y]: [f64; 2]) -> bool {
         x >= -0.5 && y >= -0.5 && x < f64::from(self.width) - 0.5 && y < f64::from(self.height) - 0.5
-    }
-}
-
-/// Where a camera stands and how it is turned.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Pose {
-    /// The rotation: the view frame has x right, y down, z forward.
-    pub view_from_model: Matrix3<f64>,
-    /// The pinhole in the model frame.
-    pub position: Vector3<f64>,
-}
-
-impl Pose {
-    /// At the origin, the axes of the view are those of the model.
-    pub fn identity() -> Self {
-        Self { view_from_model: Matrix3::identity(), position: Vector3::zeros() }
-    }
-
-    /// From `x_view = R x_model + t`.
-    pub fn from_translation(view_from_model: Matrix3<f64>, translation: Vector3<f64>) -> Self {
-        Self { view_from_model, position: -(view_from_model.transpose() * translation) }
-    }
-
-    /// `t` of `x_view = R x_model + t`.
-    pub fn translation(&self) -> Vector3<f64> {
-        -(self.view_from_model * self.position)
-    }
-
-    /// A point of the model in the view frame.
-    pub fn to_view(&self, point: &Vector3<f64>) -> Vector3<f64> {
-        self.view_from_model * (point - self.position)
-    }
-
-    /// The camera without distortion; `None` for a lens without focal length.
-    pub fn pinhole(&self, lens: &Lens) -> Option<Pinhole> {
-        let matrix = lens.matrix() * self.view_from_model;
-        let rows = [0, 1, 2].map(|row| [matrix[(row, 0)], matrix[(row, 1)], matrix[(row, 2)]]);
-        Pinhole::new(rows, self.position.into())
     }
 }
 

@@ -2,8 +2,8 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::nearest::NearestPoints;
 use crate::synthesize::dense::DenseCloud;
+use daymark_numerics::nearest::NearestPoints;
 
 /// Points of a model with what is known of each.
 #[derive(Debug, Clone)]
@@ -27,6 +27,12 @@ impl Cloud {
 
     /// The points of a dense cloud that lie on a triangle.
     pub fn of_dense(dense: &DenseCloud) -> Self {
+        let cloud = Self::asking(dense);
+        Self::new(cloud.positions, cloud.gray, cloud.deviation)
+    }
+
+    /// The same without a tree: it asks others, and is not asked.
+    pub fn asking(dense: &DenseCloud) -> Self {
         let mut used = vec![false; dense.positions.len()];
         for &point in dense.triangles.iter().flatten() {
             used[point as usize] = true;
@@ -37,7 +43,7 @@ impl Cloud {
         let positions: Vec<_> = numbers().map(|n| dense.positions[n]).collect();
         let deviation = libm::sqrt(squares / positions.len().max(1) as f64);
         let gray = numbers().map(|n| dense.gray[n]).collect();
-        Self::new(positions, gray, deviation)
+        Self { positions, gray, deviation, tree: NearestPoints::new(&[]) }
     }
 
     /// The middle of all points.

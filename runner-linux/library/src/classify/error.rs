@@ -44,10 +44,7 @@ const MIN_POINTS: usize = 30;
 /// Compares a test with a base in the base's frame. `reach` is how far corresponding points may be apart for their
 /// intensities to be compared.
 pub fn compare(test: &Cloud, base: &Cloud, base_from_test: Similarity, reach: f64) -> Comparison {
-    let moved: Vec<[f32; 3]> = test.positions.iter().map(|&point| base_from_test.apply_f32(point)).collect();
-    let nearest = base.tree.nearest_of_each(&moved, &base.positions);
-    let distances: Vec<f32> = nearest.iter().map(|n| n.map_or(f32::INFINITY, |n| n.squared)).collect();
-    let mean = |squares: &[f32]| squares.iter().map(|&s| f64::from(s)).sum::<f64>() / squares.len().max(1) as f64;
+    let (distances, intensity) = compare_one_sided(test, base, &base_from_test, reach);
     let one_sided = mean(&distances);
     // Back in the test's frame its own tree answers; distances there are smaller by the scale.
     let test_from_base = base_from_test.inverse();
@@ -59,18 +56,37 @@ pub fn compare(test: &Cloud, base: &Cloud, base_from_test: Similarity, reach: f6
         .map(|n| n.map_or(f32::INFINITY, |n| n.squared))
         .collect();
     let other = mean(&other) * base_from_test.scale * base_from_test.scale;
+    Comparison {
+        shape: ShapeError { one_sided, symmetric: f64::midpoint(one_sided, other) },
+        intensity,
+        distances: distances.into_iter().map(libm::sqrtf).collect(),
+        base_from_test,
+    }
+}
+
+/// The squared distances of a test's points from a base, and their intensities' error: the half of [`compare`] that needs no
+/// tree of the test.
+pub fn compare_one_sided(
+    test: &Cloud,
+    base: &Cloud,
+    base_from_test: &Similarity,
+    reach: f64,
+) -> (Vec<f32>, Option<IntensityError>) {
+    let moved: Vec<[f32; 3]> = test.positions.iter().map(|&point| base_from_test.apply_f32(point)).collect();
+    let nearest = base.tree.nearest_of_each(&moved, &base.positions);
+    let distances = nearest.iter().map(|n| n.map_or(f32::INFINITY, |n| n.squared)).collect();
     let pairs = test.gray.iter().zip(&nearest).filter_map(|(&gray, nearest)| {
         let nearest = (*nearest)?;
         let there = *base.gray.get(nearest.number as usize)?;
         let near = f64::from(nearest.squared) <= reach * reach;
         (near && gray.is_finite() && there.is_finite()).then(|| (f64::from(gray), f64::from(there)))
     });
-    Comparison {
-        shape: ShapeError { one_sided, symmetric: f64::midpoint(one_sided, other) },
-        intensity: intensity(pairs),
-        distances: distances.into_iter().map(libm::sqrtf).collect(),
-        base_from_test,
-    }
+    (distances, intensity(pairs))
+}
+
+/// The mean of squared distances; 0 of none.
+pub fn mean(squares: &[f32]) -> f64 {
+    squares.iter().map(|&s| f64::from(s)).sum::<f64>() / squares.len().max(1) as f64
 }
 
 fn intensity(pairs: impl Iterator<Item = (f64, f64)>) -> Option<IntensityError> {

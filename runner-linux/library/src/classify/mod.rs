@@ -4,7 +4,6 @@
 //!  cloud ─ nearest ── align ── error ── decide
 //! ```
 
-pub mod nearest;
 pub mod cloud;
 pub mod align;
 pub mod error;

@@ -10,11 +10,13 @@ use daymark_core::mesh::SubdivisionLevel;
 use indicatif::ProgressBar;
 
 use super::{CommandError, Outcome};
+use crate::classify::cloud::Similarity;
+use crate::enroll::upright::upright as upright_by_walls;
 use crate::model_file::Format;
 use crate::parallel;
 use crate::picture::{PictureError, read_colour, scaled_colours};
 use crate::synthesize::frame::{Scale, moved, upright};
-use crate::synthesize::reconstruct::{Cameras, Corners, NoModel, Shape, reconstruct};
+use crate::synthesize::reconstruct::{Cameras, Corners, NoModel, Reconstruction, Shape, reconstruct};
 use crate::synthesize::report::facts;
 use crate::synthesize::triangulate::Rules;
 use crate::synthesize::view::View;
@@ -196,7 +198,7 @@ fn inputs(args: &Args) -> Result<Inputs, CommandError> {
 }
 
 /// Takes a model to the frame that the arguments ask for; returns what a length of one means.
-fn place(args: &Args, made: &mut crate::synthesize::reconstruct::Reconstruction) -> Result<&'static str, CommandError> {
+fn place(args: &Args, made: &mut Reconstruction) -> Result<&'static str, CommandError> {
     let asked = match (args.distance_m, args.height_m) {
         (Some(metres), _) | (_, Some(metres)) if !(metres > 0.0 && metres < 1e6) => {
             return Err(format!("{metres} m is no distance or height of a building").into());
@@ -222,10 +224,10 @@ fn place(args: &Args, made: &mut crate::synthesize::reconstruct::Reconstruction)
     if made.shape == Shape::Metric {
         return Err("the cameras' file says how long everything is: leave out --distance-m and --height-m".into());
     }
-    let (map, unit) = match upright(made, &asked) {
+    let (map, unit) = match levelled(made, &asked) {
         Some(map) => (map, "metre"),
         None if matches!(asked, Scale::Places(_)) => {
-            (upright(made, &Scale::None).ok_or("the cameras do not say where up is")?, "first_baseline")
+            (levelled(made, &Scale::None).ok_or("the cameras do not say where up is")?, "first_baseline")
         }
         None => {
             return Err(
@@ -235,6 +237,12 @@ fn place(args: &Args, made: &mut crate::synthesize::reconstruct::Reconstruction)
     };
     moved(made, &map);
     Ok(unit)
+}
+
+/// Upright by walls and level cameras, as landmarks are enrolled; by the cameras' mean up where those say nothing.
+fn levelled(made: &Reconstruction, scale: &Scale) -> Option<Similarity> {
+    let by_walls = upright_by_walls(made, (scale.clone(), None), &[], 0.0, None);
+    by_walls.map(|frame| frame.map).or_else(|| upright(made, scale))
 }
 
 /// Says on a terminal what is going on.

@@ -1,12 +1,14 @@
 //! Which features of which views are the same point: look-alikes, checked by epipolar geometry, joined to tracks.
 
+use daymark_numerics::align::{Aligner, smoothed};
+use daymark_numerics::epipolar::{Estimate, Pair, RelativePose, relative_pose};
+use daymark_numerics::look_alike::{ViewFeatures, guided_matches, mutual_matches};
 use serde::Serialize;
 
-use super::epipolar::{Estimate, Pair, RelativePose, relative_pose};
 use super::explain::{Explained, LeftOut, Reason};
 use super::factorize::affine_inliers;
-use super::features::{ViewFeatures, guided_matches, mutual_matches};
 use super::view::{Station, Track, View};
+use crate::camera_file::lens::Lens;
 use crate::parallel;
 
 /// Distance from the epipolar line within which a match is right, pixels of the working size.
@@ -126,19 +128,18 @@ fn matched([a, b]: [usize; 2], views: &[View], features: &[ViewFeatures], geomet
         .collect();
     // With the geometry known, look-alikes that were not clear before may be now.
     let limit = threshold * threshold;
-    let lines = estimate.pose.lines(
-        one.ideal.iter().map(|&at| left.normalized_from_ideal(at)),
-        other.ideal.iter().map(|&at| right.normalized_from_ideal(at)),
-    );
-    // What has no direction is NaN, and not below.
-    for pair in guided_matches(one, other, &matches, |a, b| lines.squared_distance(a, b) < limit) {
+    let all = |lens: &Lens, ideal: &[[f64; 2]]| -> Vec<[f64; 2]> {
+        ideal.iter().map(|&at| lens.normalized_from_ideal(at)).collect()
+    };
+    let lines = estimate.pose.lines(&all(left, &one.ideal), &all(right, &other.ideal));
+    for pair in guided_matches(one, other, &matches, &lines, limit) {
         if estimate.pose.depths(&direction(pair)).is_some_and(|[a, b]| a > 0.0 && b > 0.0) {
             matches.push(pair);
         }
     }
     let refined: Vec<Pair> = matches.iter().map(|&pair| direction(pair)).collect();
     if matches!(geometry, Geometry::Lenses) {
-        estimate.pose = estimate.pose.refined(&refined.iter(), threshold / 2.0, 10);
+        estimate.pose = estimate.pose.refined(&refined, threshold / 2.0, 10);
     }
     PairMatches { views: [a, b], alike: alike.len(), agreeing, matches, estimate: Some(estimate), left_out }
 }
@@ -223,10 +224,60 @@ pub fn tracks_explained(features: &[ViewFeatures], pairs: &[PairMatches]) -> (Ve
     (tracks, removed, explained)
 }
 
+/// Moves the sightings of each track to where their pictures show what the first one does, as far as that can be told.
+pub fn align(views: &[View], tracks: &mut [Track]) {
+    let aligner = Aligner::default();
+    let smooth = parallel::map(views, |view| smoothed(&view.gray));
+    let aligned = parallel::map(tracks, |track| {
+        let mut sightings = track.sightings.clone();
+        let Some((&mut (first, at), others)) = sightings.split_first_mut() else { return sightings };
+        let Some(patch) = aligner.patch(&smooth[first], views[first].lens.picture_from_ideal(at)) else {
+            return sightings;
+        };
+        for (number, at) in others {
+            let view = &views[*number];
+            let found = patch.found_in(&smooth[*number], view.lens.picture_from_ideal(*at));
+            *at = found.and_then(|found| view.lens.ideal_from_picture(found)).unwrap_or(*at);
+        }
+        sightings
+    });
+    for (track, sightings) in tracks.iter_mut().zip(aligned) {
+        track.sightings = sightings;
+    }
+}
+
 fn root(parent: &mut [usize], mut node: usize) -> usize {
     while parent[node] != node {
         parent[node] = parent[parent[node]];
         node = parent[node];
     }
     node
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::classify::towers::{Conditions, TowerViews, TrueSurface};
+    use crate::synthesize::features::features;
+    use crate::synthesize::triangulate::{Rules, points};
+    use daymark_fixtures::{Light, Tower};
+
+    #[test]
+    fn aligned_corners_lie_nearer_to_the_surface() {
+        let tower = &Tower::eight()[0];
+        let conditions = Conditions { light: Light::morning(), seed: 301, farther: 1.0 };
+        let seen = TowerViews::new(tower, &[-8.0, 10.0], &conditions, false);
+        let surface = TrueSurface::new(tower);
+        let found: Vec<_> = seen.views().iter().map(|view| features(view).unwrap()).collect();
+        let matches = pairs(seen.views(), &found, Geometry::Known(seen.stations()));
+        let (mut tracks, _) = tracks(&found, &matches);
+        let median = |tracks: &[Track]| {
+            let (vertices, _) = points(tracks, seen.stations(), &Rules::default());
+            surface.distances(vertices.into_iter().map(|vertex| vertex.position))[0]
+        };
+        let before = median(&tracks);
+        align(seen.views(), &mut tracks);
+        let after = median(&tracks);
+        assert!(after < 0.6 * before, "{before} m, then {after} m");
+    }
 }

@@ -3,10 +3,12 @@
 use std::fmt;
 
 use daymark_core::mesh::{MeshCounts, MeshError, SubdivisionLevel, TriangleMesh, storage_words};
+use daymark_numerics::dense::{Shown, Subdivided, subdivided};
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use super::view::{Station, Surface, View};
+use crate::camera_file::distortion::Distortion;
 
 /// Points of a dense cloud, at most: with triangles 1.2 GB ([`BYTES_PER_POINT`]).
 pub const MAX_POINTS: u64 = 24_000_000;
@@ -109,52 +111,43 @@ pub fn dense(
     }
     let corners: Vec<[f32; 3]> =
         surface.vertices.iter().map(|vertex| <[f64; 3]>::from(vertex.position).map(|c| c as f32)).collect();
-    let mut positions = vec![[0.0; 3]; counts.vertices as usize];
-    fine.write_values(&corners, &mut positions).map_err(DenseError::Mesh)?;
-    let mut triangles = vec![[0; 3]; counts.triangles as usize];
-    fine.write_triangles(&mut triangles).map_err(DenseError::Mesh)?;
-
-    // A vertex belongs to the first triangle that has it.
-    let mut triangle_of_vertex = vec![None; surface.vertices.len()];
-    for (number, triangle) in (0_u32..).zip(&surface.triangles) {
-        for &vertex in triangle {
-            triangle_of_vertex[vertex as usize].get_or_insert(number);
-        }
-    }
-    let share = 1.0 / f64::from(level.steps());
     let variances: Vec<f64> = surface.vertices.iter().map(|vertex| vertex.covariance.trace()).collect();
-    let mut deviations = Vec::with_capacity(positions.len());
-    // The view of each point; `u32::MAX` where no view shows its triangle.
-    let mut views_of_points = Vec::with_capacity(positions.len());
-    fine.points().for_each(|point| {
-        let parts = point.corners.iter().zip(point.weights);
-        let variance: f64 = parts
-            .map(|(&corner, weight)| {
-                let share = f64::from(weight) * share;
-                share * share * variances[usize::from(corner)]
+    let values: Vec<u32> = shown.iter().map(|view| view.unwrap_or(u32::MAX)).collect();
+    let Subdivided { positions, deviations, values: views_of_points, triangles } =
+        subdivided(&fine, &corners, &variances, &values).map_err(DenseError::Mesh)?;
+    let maps: Vec<_> = views.iter().map(|view| |at: [f64; 2]| view.lens.picture_from_ideal(at)).collect();
+    let pictures: Vec<Option<Shown<'_>>> = views
+        .iter()
+        .zip(stations)
+        .zip(&maps)
+        .map(|((view, station), map)| {
+            let straight = view.lens.distortion == Distortion::None;
+            Some(Shown {
+                gray: &view.gray,
+                rgb: &view.rgb,
+                pinhole: &station.as_ref()?.pinhole,
+                picture_from_ideal: (!straight).then_some(map as _),
             })
-            .sum();
-        deviations.push(libm::sqrt(variance) as f32);
-        let triangle = point.triangle.or_else(|| triangle_of_vertex[usize::from(point.corners[0])]);
-        let view = triangle.and_then(|triangle| shown.get(triangle as usize).copied().flatten());
-        views_of_points.push(view.unwrap_or(u32::MAX));
-    });
+        })
+        .collect();
     let mut gray = vec![f32::NAN; positions.len()];
     let mut rgb = vec![[128; 3]; positions.len()];
     let of_points = positions.par_chunks(CHUNK).zip(views_of_points.par_chunks(CHUNK));
-    of_points.zip(gray.par_chunks_mut(CHUNK).zip(rgb.par_chunks_mut(CHUNK))).for_each(|(points, colours)| {
-        let colours = colours.0.iter_mut().zip(colours.1);
-        for ((position, view), (gray, rgb)) in points.0.iter().zip(points.1).zip(colours) {
-            let number = *view as usize;
-            let (Some(view), Some(Some(station))) = (views.get(number), stations.get(number)) else { continue };
-            if let Some(at) = station.pinhole.project(position.map(f64::from)) {
-                let at = view.lens.picture_from_ideal(at);
-                // What a point stands for is more than a pixel's middle.
-                *gray = view.mean_gray_at(at) / 255.0;
-                *rgb = view.colour_at(at).map(|channel| (channel + 0.5) as u8);
+    of_points.zip(gray.par_chunks_mut(CHUNK).zip(rgb.par_chunks_mut(CHUNK))).for_each(
+        |((points, numbers), colours)| {
+            let (mut points, mut gray, mut rgb) = (points, colours.0, colours.1);
+            // Points of a triangle follow each other.
+            for run in numbers.chunk_by(|one, next| one == next) {
+                let (run_points, run_gray, run_rgb);
+                (run_points, points) = points.split_at(run.len());
+                (run_gray, gray) = gray.split_at_mut(run.len());
+                (run_rgb, rgb) = rgb.split_at_mut(run.len());
+                if let Some(Some(picture)) = pictures.get(run[0] as usize) {
+                    picture.colour(run_points, run_gray, run_rgb);
+                }
             }
-        }
-    });
+        },
+    );
     Ok(DenseCloud { level, positions, deviations, gray, rgb, triangles })
 }
 

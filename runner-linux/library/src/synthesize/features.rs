@@ -1,41 +1,16 @@
-//! Corners and signatures of a view, many more than recognition takes, and which of two views' look alike.
+//! Corners and signatures of a view, many more than recognition takes.
 
 use daymark_core::extract::FrontEnd;
-use daymark_core::feature::Signature;
 use daymark_core::image::FrameError;
-use daymark_core::kernel::{Kernels, places};
 use daymark_engine::reader::{FrameReader, MOST_FEATURES};
+use daymark_numerics::look_alike::ViewFeatures;
 
 use super::view::View;
-use crate::order;
 use crate::simd::Processor;
 
 /// Features of a view, at most.
 pub const FEATURES: usize = MOST_FEATURES;
 const FRONT_END: FrontEnd = FrontEnd { features: FEATURES as u16, cell_share_tenths: 20 };
-/// Bits by which matching signatures may differ, of 128.
-const MAX_BITS: u32 = 40;
-/// The best match must have at most this share of the next one's bits, in hundredths.
-const RATIO_PERCENT: u32 = 85;
-/// Along a line there are fewer to be mistaken for.
-const GUIDED_RATIO_PERCENT: u32 = 80;
-/// A line holds dozens of features, and one of them is always on it: signatures must be nearer than elsewhere.
-const MAX_GUIDED_BITS: u8 = 28;
-/// Bits at which a rival is looked at.
-const MAX_RIVAL_BITS: u8 = 48;
-/// What lies this near is the same place, no competitor; pixels.
-const SAME_PLACE: f64 = 6.0;
-
-/// The features of a view as columns.
-#[derive(Debug, Clone, Default)]
-pub struct ViewFeatures {
-    /// Where they are in the picture, pixels.
-    pub points: Vec<[f64; 2]>,
-    /// The same without distortion; NaN where no ray comes from.
-    pub ideal: Vec<[f64; 2]>,
-    /// Their signatures.
-    pub signatures: Vec<Signature>,
-}
 
 /// Finds a view's features.
 ///
@@ -52,98 +27,4 @@ pub fn features(view: &View) -> Result<ViewFeatures, FrameError> {
         found.signatures.push(feature.signature);
     }
     Ok(found)
-}
-
-/// Pairs of features whose signatures are nearest to one another in both directions, clearly nearer than the next ones
-/// elsewhere. Ties have no match. `O(n m)`.
-pub fn mutual_matches(first: &ViewFeatures, second: &ViewFeatures) -> Vec<[u32; 2]> {
-    let processor = Processor::detect();
-    let kernels = processor.kernels();
-    let mut row = Row::new(first.points.len().max(second.points.len()));
-    (0..first.points.len())
-        .filter_map(|number| {
-            let best = row.nearest(kernels, first.signatures[number], second)?;
-            // The way back is looked for only where there is one.
-            let back = row.nearest(kernels, second.signatures[best], first)?;
-            (back == number).then_some([number as u32, best as u32])
-        })
-        .collect()
-}
-
-/// Distances of one signature from many, and room to look for the near ones.
-struct Row {
-    distances: Vec<u8>,
-    marks: Vec<u64>,
-}
-
-impl Row {
-    fn new(length: usize) -> Self {
-        Self { distances: vec![0; length], marks: vec![0; length.div_ceil(64)] }
-    }
-
-    /// The feature nearest to a signature, if it is near and no other one elsewhere comes close.
-    fn nearest(&mut self, kernels: &dyn Kernels, signature: Signature, to: &ViewFeatures) -> Option<usize> {
-        let row = self.distances.get_mut(..to.signatures.len())?;
-        let marks = self.marks.get_mut(..row.len().div_ceil(64))?;
-        kernels.distances(signature, &to.signatures, row);
-        let least = row.iter().copied().min()?;
-        if u32::from(least) > MAX_BITS {
-            return None;
-        }
-        kernels.marks_at_most(row, (u32::from(least) * 100 / RATIO_PERCENT) as u8, marks);
-        let best = places(marks).find(|&place| row[place] == least)?;
-        let rival = places(marks).any(|other| elsewhere(to.points[other], to.points[best]));
-        (!rival).then_some(best)
-    }
-}
-
-fn elsewhere(a: [f64; 2], b: [f64; 2]) -> bool {
-    (a[0] - b[0]).abs() > SAME_PLACE || (a[1] - b[1]).abs() > SAME_PLACE
-}
-
-/// For features without a match: the nearest signature among those that `near` allows, if no other comes close.
-///
-/// `near` is asked with the numbers of two features, and only about look-alikes.
-pub fn guided_matches(
-    first: &ViewFeatures,
-    second: &ViewFeatures,
-    known: &[[u32; 2]],
-    near: impl Fn(usize, usize) -> bool,
-) -> Vec<[u32; 2]> {
-    let (mut left, mut right) = (vec![false; first.points.len()], vec![false; second.points.len()]);
-    for &[a, b] in known {
-        (left[a as usize], right[b as usize]) = (true, true);
-    }
-    // What is left of the second view, side by side.
-    let rest: Vec<usize> = (0..right.len()).filter(|&b| !right[b]).collect();
-    let signatures: Vec<Signature> = rest.iter().map(|&b| second.signatures[b]).collect();
-    let mut found: Vec<(u8, [u32; 2])> = Vec::new();
-    let processor = Processor::detect();
-    let kernels = processor.kernels();
-    let Row { mut distances, mut marks } = Row::new(rest.len());
-    for (a, signature) in first.signatures.iter().enumerate().filter(|(a, _)| !left[*a]) {
-        kernels.distances(*signature, &signatures, &mut distances);
-        // Most have nothing that is near enough: their rivals need not be looked at.
-        kernels.marks_at_most(&distances, MAX_GUIDED_BITS, &mut marks);
-        let allowed = places(&marks).filter(|&place| near(a, rest[place]));
-        let Some((least, best)) = allowed.map(|place| (distances[place], rest[place])).min() else { continue };
-        kernels.marks_at_most(&distances, MAX_RIVAL_BITS, &mut marks);
-        let rivals = places(&marks).filter(|&place| {
-            u32::from(least) * 100 > u32::from(distances[place]) * GUIDED_RATIO_PERCENT
-                && elsewhere(second.points[rest[place]], second.points[best])
-        });
-        let mut rivals = rivals.map(|place| rest[place]);
-        if !rivals.any(|rival| near(a, rival)) {
-            found.push((least, [a as u32, best as u32]));
-        }
-    }
-    // One to one, the best first.
-    order::sort(&mut found);
-    found
-        .into_iter()
-        .filter_map(|(_, pair)| {
-            let taken = std::mem::replace(&mut right[pair[1] as usize], true);
-            (!taken).then_some(pair)
-        })
-        .collect()
 }

@@ -7,12 +7,12 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use daymark_numerics::sights::{Covering, Places, Sights, area};
 use nalgebra::Vector3;
 use serde::Serialize;
 use spade::handles::FixedVertexHandle;
 use spade::{DelaunayTriangulation, HasPosition, Point2, Triangulation};
 
-use super::cells::{Cells, bounds};
 use super::view::{Station, Surface, Vertex};
 use crate::order;
 use crate::parallel;
@@ -35,9 +35,6 @@ pub struct Dropped {
 /// Triangles that both views of a pair see flatter than this are dropped: the sine of the angle between the surface and
 /// the line of sight.
 const GRAZING_SINE: f64 = 0.10;
-/// A point is hidden if a triangle stands before it by more than this share of its distance, and more than three standard
-/// deviations.
-const HIDING_SHARE: f64 = 0.004;
 
 struct Site {
     position: Point2<f64>,
@@ -97,10 +94,16 @@ pub fn surface(
     pairs: &[[usize; 2]],
     spacing_px: f64,
 ) -> (Surface, Dropped) {
-    let sights: Vec<Option<Sights>> =
-        parallel::numbers(stations.len(), |view| Some(Sights::new(view, stations[view].as_ref()?, &vertices)));
+    let places = Places {
+        positions: vertices.iter().map(|vertex| vertex.position).collect(),
+        deviations: vertices.iter().map(|vertex| libm::sqrt(vertex.covariance.trace().max(0.0))).collect(),
+    };
+    let sights: Vec<Option<Sights>> = parallel::numbers(stations.len(), |view| {
+        let seen = (0_u32..).zip(&vertices).filter(|(_, vertex)| vertex.track.seen_by(view).is_some());
+        Some(Sights::new(&stations[view].as_ref()?.pinhole, &places, seen.map(|(number, _)| number)))
+    });
     let candidates: Vec<(Vec<[u32; 3]>, Dropped)> =
-        parallel::map(pairs, |&pair| pair_triangles(&vertices, stations, &sights, pair, spacing_px));
+        parallel::map(pairs, |&pair| pair_triangles(&vertices, &places, stations, &sights, pair, spacing_px));
     let mut dropped = Dropped::default();
     let mut triangles: Vec<[u32; 3]> = Vec::new();
     // Directed edges: each belongs to one triangle, so that the surface is one that core's mesh accepts.
@@ -112,7 +115,7 @@ pub fn surface(
         dropped.grazing += lost.grazing;
         dropped.hiding += lost.hiding;
         let Some(station) = stations.get(first).and_then(Option::as_ref) else { continue };
-        let covering = Covering::new(&vertices, &triangles, station);
+        let covering = Covering::new(&station.pinhole, &places, &triangles);
         for triangle in found {
             let [a, b, c] = triangle;
             let around = [[a, b], [b, c], [c, a]];
@@ -137,6 +140,7 @@ fn sorted(mut triangle: [u32; 3]) -> [u32; 3] {
 
 fn pair_triangles(
     vertices: &[Vertex],
+    all_places: &Places,
     stations: &[Option<Station>],
     sights: &[Option<Sights>],
     [first, second]: [usize; 2],
@@ -168,7 +172,7 @@ fn pair_triangles(
         let places = corners.map(|vertex| vertices[vertex as usize].position);
         if [one, other].iter().all(|station| sine_of_sight(&places, &station.pose.position) < GRAZING_SINE) {
             dropped.grazing += 1;
-        } else if sights.iter().flatten().any(|sights| sights.has_hidden(vertices, corners, &places)) {
+        } else if sights.iter().flatten().any(|sights| sights.has_hidden(all_places, corners)) {
             dropped.hiding += 1;
         } else {
             // With y down, positive is clockwise as seen: turned, it is counter-clockwise from outside.
@@ -208,131 +212,12 @@ fn spaced(
     points
 }
 
-/// Twice the signed area; positive from +x towards +y.
-pub(super) fn area([a, b, c]: [[f64; 2]; 3]) -> f64 {
-    (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
-}
-
 /// Sine of the angle between a triangle's plane and the line of sight to its middle.
 fn sine_of_sight(places: &[Vector3<f64>; 3], eye: &Vector3<f64>) -> f64 {
     let normal = (places[1] - places[0]).cross(&(places[2] - places[0]));
     let sight = (places[0] + places[1] + places[2]) / 3.0 - eye;
     let length = normal.norm() * sight.norm();
     if length > 0.0 { normal.dot(&sight).abs() / length } else { 0.0 }
-}
-
-/// What one view sees: its points' images by cells, so that a triangle is compared with what it may hide only.
-struct Sights {
-    station: Station,
-    cells: Cells,
-    /// For each vertex a bound of how far it is from where it seems to be.
-    deviations: Vec<f64>,
-}
-
-impl Sights {
-    fn new(view: usize, station: &Station, vertices: &[Vertex]) -> Self {
-        let images: Vec<(u32, [[f64; 2]; 2])> = (0_u32..)
-            .zip(vertices)
-            .filter(|(_, vertex)| vertex.track.seen_by(view).is_some())
-            .filter_map(|(number, vertex)| {
-                let at = station.pinhole.project(vertex.position.into())?;
-                Some((number, [at, at]))
-            })
-            .collect();
-        let deviations = vertices.iter().map(|vertex| libm::sqrt(vertex.covariance.trace().max(0.0))).collect();
-        Self { station: *station, cells: Cells::new(&images), deviations }
-    }
-
-    /// Whether the view sees a point through this triangle.
-    fn has_hidden(&self, vertices: &[Vertex], corners: [u32; 3], places: &[Vector3<f64>; 3]) -> bool {
-        let eye = self.station.pose.position;
-        let normal = (places[1] - places[0]).cross(&(places[2] - places[0]));
-        let hides = |number: u32| {
-            if corners.contains(&number) {
-                return false;
-            }
-            let (vertex, deviation) = (&vertices[number as usize], self.deviations[number as usize]);
-            let sight = vertex.position - eye;
-            let slope = normal.dot(&sight);
-            if slope == 0.0 {
-                return false;
-            }
-            let way = normal.dot(&(places[0] - eye)) / slope;
-            let length = sight.norm();
-            if !(way > 0.0 && (1.0 - way) * length > (HIDING_SHARE * length).max(3.0 * deviation)) {
-                return false;
-            }
-            let met = eye + sight * way;
-            // Well inside: away from the edges by a hundredth of the triangle.
-            barycentric(places, &normal, &met).iter().all(|&weight| weight > 0.01)
-        };
-        let images = places.map(|place| self.station.pinhole.project(place.into()));
-        match images {
-            // In front of the camera the image of a triangle is a triangle: only what lies in it can be hidden by it.
-            [Some(a), Some(b), Some(c)] => self.cells.within(bounds([a, b, c])).any(hides),
-            _ => self.cells.all().any(hides),
-        }
-    }
-}
-
-fn barycentric(places: &[Vector3<f64>; 3], normal: &Vector3<f64>, at: &Vector3<f64>) -> [f64; 3] {
-    let squared = normal.norm_squared();
-    let part = |a: usize, b: usize| (places[b] - places[a]).cross(&(at - places[a])).dot(normal) / squared;
-    [part(1, 2), part(2, 0), part(0, 1)]
-}
-
-/// What lies in one view's picture already.
-struct Covering {
-    /// Pixels and depth of each vertex that lies in front.
-    images: Vec<Option<[f64; 3]>>,
-    /// Triangles that face the view.
-    facing: Vec<[[f64; 3]; 3]>,
-    cells: Cells,
-}
-
-impl Covering {
-    fn new(vertices: &[Vertex], triangles: &[[u32; 3]], station: &Station) -> Self {
-        let images: Vec<Option<[f64; 3]>> = vertices.iter().map(|vertex| image(vertex, station)).collect();
-        let facing: Vec<[[f64; 3]; 3]> = triangles
-            .iter()
-            .filter_map(|triangle| {
-                let corners = triangle.map(|vertex| images[vertex as usize]);
-                let [Some(a), Some(b), Some(c)] = corners else { return None };
-                // Counter-clockwise from outside is negative with y down.
-                let facing = area([[a[0], a[1]], [b[0], b[1]], [c[0], c[1]]]) < 0.0;
-                facing.then_some([a, b, c])
-            })
-            .collect();
-        let rectangles: Vec<_> =
-            (0..).zip(&facing).map(|(number, corners)| (number, bounds(corners.map(|[x, y, _]| [x, y])))).collect();
-        Self { images, cells: Cells::new(&rectangles), facing }
-    }
-
-    /// Whether a triangle's middle lies on another one at about the same depth, or behind one.
-    fn covers(&self, triangle: [u32; 3]) -> bool {
-        let [Some(a), Some(b), Some(c)] = triangle.map(|vertex| self.images[vertex as usize]) else { return true };
-        // In perspective depth is linear in its inverse.
-        let middle = [0, 1].map(|axis| (a[axis] + b[axis] + c[axis]) / 3.0);
-        let depth = 3.0 / (1.0 / a[2] + 1.0 / b[2] + 1.0 / c[2]);
-        self.cells.within([middle; 2]).any(|number| {
-            let [p, q, r] = &self.facing[number as usize];
-            let whole = area([[p[0], p[1]], [q[0], q[1]], [r[0], r[1]]]);
-            let weight = |s: &[f64; 3], t: &[f64; 3]| area([[s[0], s[1]], [t[0], t[1]], middle]) / whole;
-            let (u, v, w) = (weight(q, r), weight(r, p), weight(p, q));
-            // A shared edge is no cover.
-            if u < 1e-6 || v < 1e-6 || w < 1e-6 {
-                return false;
-            }
-            let there = 1.0 / (u / p[2] + v / q[2] + w / r[2]);
-            there < depth * 1.03
-        })
-    }
-}
-
-fn image(vertex: &Vertex, station: &Station) -> Option<[f64; 3]> {
-    let position: [f64; 3] = vertex.position.into();
-    let [x, y] = station.pinhole.project(position)?;
-    Some([x, y, station.pinhole.depth(position)])
 }
 
 #[cfg(test)]

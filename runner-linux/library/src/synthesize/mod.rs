@@ -10,7 +10,7 @@
 //!  mesh ── Delaunay for each pair of views, what cannot be seen dropped, pairs merged
 //!    │
 //!    ▼
-//!  texture ── the view that shows each triangle best (render: depth buffers)
+//!  texture ── the view that shows each triangle best (by depth buffers)
 //!    │
 //!    ▼
 //!  dense ── midpoint subdivision to a level: points, deviations, colours
@@ -18,10 +18,8 @@
 
 pub mod view;
 pub mod features;
-pub mod epipolar;
 pub mod factorize;
 pub mod correspond;
-pub mod bundle;
 pub mod motion;
 pub mod corner_file;
 pub mod reconstruct;
@@ -29,9 +27,7 @@ pub mod frame;
 pub mod explain;
 pub mod report;
 pub mod triangulate;
-pub mod cells;
 pub mod mesh;
-pub mod render;
 pub mod texture;
 pub mod dense;
 pub mod model;

@@ -3,10 +3,10 @@
 use std::fmt;
 
 use daymark_core::camera::triangulate::{Sighting, triangulate};
+use daymark_numerics::bundle::{Adjusted, Bundle, Common, Free, Observation};
 use nalgebra::{Matrix3, Vector3};
 use serde::Serialize;
 
-use super::bundle::{Adjusted, Bundle, Common, Free, Observation};
 use super::correspond::{MIN_INLIERS, MIN_SHARE, PairMatches};
 use super::view::{Station, Track, View};
 use crate::camera_file::distortion::Distortion;

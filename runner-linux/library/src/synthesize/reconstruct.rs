@@ -3,13 +3,14 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
+use daymark_numerics::epipolar::relative_pose;
+use daymark_numerics::look_alike::ViewFeatures;
 use serde::Serialize;
 
 use super::correspond::{self, Geometry, PairMatches, RemovedMatches};
-use super::epipolar::relative_pose;
 use super::explain::{Explained, LeftOut, Reason};
 use super::factorize::{NoShape, factorize};
-use super::features::{ViewFeatures, features};
+use super::features::features;
 use super::model::Model;
 use super::motion::{NoMotion, motion};
 use super::triangulate::Rules;
@@ -228,7 +229,8 @@ fn correspondences(views: &[View], geometry: Geometry<'_>, corners: &Corners) ->
                 features(view).map_err(|error| NoModel::Picture(format!("{}: {error}", view.name)))
             })?;
             let pairs = correspond::pairs(views, &found, geometry);
-            let (tracks, removed, explained) = correspond::tracks_explained(&found, &pairs);
+            let (mut tracks, removed, explained) = correspond::tracks_explained(&found, &pairs);
+            correspond::align(views, &mut tracks);
             Ok((pairs, tracks, removed, explained))
         }
         Corners::Picked(corners) => {

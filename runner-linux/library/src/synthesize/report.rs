@@ -168,7 +168,7 @@ fn coverage(made: &Reconstruction) -> Vec<f64> {
         let Some(station) = station else { return 0.0 };
         let size = [view.gray.width.div_ceil(8), view.gray.height.div_ceil(8)];
         let triangles = &made.model.surface.triangles;
-        let buffer = super::render::DepthBuffer::new(&station.pinhole, size, 0.125, &positions, triangles);
+        let buffer = daymark_numerics::depth::DepthBuffer::new(&station.pinhole, size, 0.125, &positions, triangles);
         buffer.triangles.iter().filter(|triangle| **triangle != u32::MAX).count() as f64
             / buffer.triangles.len().max(1) as f64
     };

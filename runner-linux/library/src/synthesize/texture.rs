@@ -1,6 +1,8 @@
 //! Which view shows each triangle best, and the intensities that it gives.
 
-use super::render::DepthBuffer;
+use daymark_numerics::depth::DepthBuffer;
+use daymark_numerics::sights::area;
+
 use super::view::{Station, Surface, View};
 use crate::parallel;
 
@@ -60,7 +62,7 @@ fn score(
     let images = corners.map(|vertex| station.pinhole.project(vertex.position.into()));
     let [Some(a), Some(b), Some(c)] = images else { return [0.0; 2] };
     // Counter-clockwise from outside is negative with y down.
-    let pixels = -0.5 * super::mesh::area([a, b, c]);
+    let pixels = -0.5 * area([a, b, c]);
     if !(pixels > 0.0) {
         return [0.0; 2];
     }

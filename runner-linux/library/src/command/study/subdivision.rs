@@ -12,7 +12,7 @@ use serde::Serialize;
 
 use super::super::{CommandError, Outcome};
 use crate::classify::cloud::{Cloud, Similarity};
-use crate::classify::error::compare;
+use crate::classify::error::{compare_one_sided, mean as mean_squared};
 use crate::classify::towers::{BASE_ANGLES, Conditions, TEST_ANGLES, TowerViews};
 use crate::report::page;
 use crate::report::plot::{Axis, Curve, Plot};
@@ -153,11 +153,12 @@ fn study(
 ) -> Result<Row, CommandError> {
     let mut largest = 0;
     let mut subdividing = Duration::ZERO;
-    let mut cloud = |model: &Model, views: &TowerViews, counts: bool| -> Result<Cloud, CommandError> {
+    let mut cloud = |model: &Model, views: &TowerViews, asked: bool, counts: bool| -> Result<Cloud, CommandError> {
         let begin = Instant::now();
         let dense = model.dense(level, views.views(), views.stations())?;
         largest = largest.max(dense.positions.len() as u64 * BYTES_PER_POINT);
-        let cloud = Cloud::of_dense(&dense);
+        // Tests ask bases, and nobody asks them.
+        let cloud = if asked { Cloud::of_dense(&dense) } else { Cloud::asking(&dense) };
         if counts {
             subdividing += begin.elapsed();
         }
@@ -170,18 +171,19 @@ fn study(
     let (mut alike, mut unlike) = (Vec::new(), Vec::new());
     let mut nearest_wrong = vec![f64::INFINITY; tests.len()];
     for (number, (model, views)) in bases.iter().enumerate() {
-        let base = cloud(model, views, true)?;
+        let base = cloud(model, views, true, true)?;
         base_points += base.positions.len();
         for (at, (tower, model, views)) in tests.iter().enumerate() {
             // Made anew for each base; the first time says how long that takes.
-            let test = cloud(model, views, number == 0)?;
+            let test = cloud(model, views, false, number == 0)?;
             test_points += if number == 0 { test.positions.len() } else { 0 };
             let begin = Instant::now();
             let reach = 0.015 * crate::classify::experiment::size(&test);
-            let found = compare(&test, &base, Similarity::shift(nalgebra::Vector3::zeros()), reach);
+            let still = Similarity::shift(nalgebra::Vector3::zeros());
+            let (squares, intensity) = compare_one_sided(&test, &base, &still, reach);
+            let shape = libm::sqrt(mean_squared(&squares));
             comparing += begin.elapsed();
-            let shape = libm::sqrt(found.shape.one_sided);
-            let look = found.intensity.map_or(1.0, |intensity| intensity.free);
+            let look = intensity.map_or(1.0, |intensity| intensity.free);
             let same_shape = [1, 4].contains(&number) && [1, 4].contains(tower);
             if number == *tower {
                 within.push(shape);

@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use daymark_core::fix::{LocalFrame, Wgs84};
+
 use crate::camera_file::lens::{Lens, Pose};
 use crate::camera_file::{CameraFileError, FileCamera, cameras as read};
 use crate::command::CommandError;
@@ -9,9 +11,6 @@ use crate::enroll::position;
 use crate::lens_source::ExifFocal;
 use crate::synthesize::reconstruct::Cameras;
 use crate::synthesize::view::View;
-
-/// Metres in one degree of latitude.
-const METRES_PER_DEGREE: f64 = 111_195.0;
 
 /// The lens of each picture (for its own size), and the places if they are known.
 pub(in crate::command) fn cameras(
@@ -108,19 +107,12 @@ fn from_files(images: &[PathBuf], sizes: &[[u32; 2]], files: &[PathBuf]) -> Resu
 
 /// Where pictures were taken by their EXIF: metres east and north of the first that says it.
 pub(super) fn places(images: &[PathBuf]) -> Vec<Option<[f64; 2]>> {
-    let degrees: Vec<Option<[f64; 2]>> = images.iter().map(|path| gps(path)).collect();
-    let Some(origin) = degrees.iter().flatten().next().copied() else { return degrees };
-    let along = libm::cos(origin[0].to_radians());
-    degrees
-        .into_iter()
-        .map(|place| {
-            let [latitude, longitude] = place?;
-            Some([(longitude - origin[1]) * METRES_PER_DEGREE * along, (latitude - origin[0]) * METRES_PER_DEGREE])
-        })
-        .collect()
-}
-
-fn gps(path: &Path) -> Option<[f64; 2]> {
-    let at = position::of_camera(path)?;
-    Some([f64::from(at.latitude_e7) / 1e7, f64::from(at.longitude_e7) / 1e7])
+    let places: Vec<Option<Wgs84>> = images.iter().map(|path| Some(position::of_camera(path)?.wgs84())).collect();
+    let Some(origin) = places.iter().flatten().next() else { return vec![None; images.len()] };
+    let frame = LocalFrame::new(*origin);
+    let level = |place: Wgs84| {
+        let [east, north, _] = frame.local_from_wgs84(place);
+        [east, north]
+    };
+    places.into_iter().map(|place| place.map(level)).collect()
 }

@@ -12,9 +12,9 @@ use crate::model_file::{Format, gltf, obj, ply};
 use crate::report::{data_uri, page as html};
 use crate::synthesize::dense::DenseCloud;
 use crate::synthesize::reconstruct::{Reconstruction, Shape};
-use crate::synthesize::render::DepthBuffer;
 use crate::synthesize::report::Facts;
 use crate::table_file::replace_file;
+use daymark_numerics::depth::DepthBuffer;
 
 /// What colours a glTF.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]

@@ -11,7 +11,7 @@ use nalgebra::{
     DMatrix, DVector, Matrix2, Matrix2x3, Matrix3, Matrix6, Matrix6x3, Rotation3, SMatrix, Vector2, Vector3, Vector6,
 };
 
-use crate::camera_file::lens::Pose;
+use crate::pose::Pose;
 
 /// What one camera sees of one point.
 #[derive(Debug, Clone, Copy, PartialEq)]

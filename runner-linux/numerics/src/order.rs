@@ -4,22 +4,22 @@
 use std::cmp::Ordering;
 
 /// Sorts numbers, as [`f64::total_cmp`] orders them.
-pub(crate) fn ascending(numbers: &mut [f64]) {
+pub fn ascending(numbers: &mut [f64]) {
     numbers.sort_unstable_by(f64::total_cmp);
 }
 
 /// Sorts in the items' own order.
-pub(crate) fn sort<T: Ord>(items: &mut [T]) {
+pub fn sort<T: Ord>(items: &mut [T]) {
     sort_by(items, T::cmp);
 }
 
 /// Sorts by keys; items with equal keys keep their order.
-pub(crate) fn sort_by_key<T, K: Ord>(items: &mut [T], key: impl Fn(&T) -> K) {
+pub fn sort_by_key<T, K: Ord>(items: &mut [T], key: impl Fn(&T) -> K) {
     sort_by(items, |a, b| key(a).cmp(&key(b)));
 }
 
 /// Sorts by a comparison; equal items keep their order.
-pub(crate) fn sort_by<T>(items: &mut [T], compare: impl Fn(&T, &T) -> Ordering) {
+pub fn sort_by<T>(items: &mut [T], compare: impl Fn(&T, &T) -> Ordering) {
     let mut sources = sorted_places(items.len(), &|a, b| compare(&items[a], &items[b]));
     // Each cycle of the permutation once: a place that has its item is its own source.
     for start in 0..items.len() {

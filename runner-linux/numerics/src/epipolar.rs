@@ -5,6 +5,8 @@
 //! view, `E = [t] R`. A pair of directions has the Sampson distance `x2' E x1 / |(E x1, E' x2)|` (first-order geometric
 //! error; Hartley and Zisserman, 11.4.3).
 
+use std::ops::Range;
+
 use crate::order;
 use daymark_core::linear::NormalEquations;
 use daymark_fixtures::random::SplitMix64;
@@ -55,16 +57,13 @@ impl RelativePose {
     }
 
     /// The epipolar lines of many directions of both views, for pairs among them.
-    pub fn lines(
-        &self,
-        first: impl Iterator<Item = [f64; 2]>,
-        second: impl Iterator<Item = [f64; 2]>,
-    ) -> EpipolarLines {
+    pub fn lines(&self, first: &[[f64; 2]], second: &[[f64; 2]]) -> EpipolarLines {
         let essential = self.essential();
         EpipolarLines {
-            of_first: first.map(|at| essential * homogeneous(at)).collect(),
+            of_first: first.iter().map(|&at| essential * homogeneous(at)).collect(),
             of_second: second
-                .map(|at| {
+                .iter()
+                .map(|&at| {
                     let line = essential.tr_mul(&homogeneous(at));
                     (at, line.x * line.x, line.y * line.y)
                 })
@@ -152,7 +151,11 @@ impl RelativePose {
 
     /// Robust least squares over these pairs; `scale` is where pairs begin to fade.
     #[must_use]
-    pub fn refined<'p>(mut self, pairs: &(impl Iterator<Item = &'p Pair> + Clone), scale: f64, steps: usize) -> Self {
+    pub fn refined(self, pairs: &[Pair], scale: f64, steps: usize) -> Self {
+        self.refined_over(&pairs.iter(), scale, steps)
+    }
+
+    fn refined_over<'p>(mut self, pairs: &(impl Iterator<Item = &'p Pair> + Clone), scale: f64, steps: usize) -> Self {
         for _ in 0..steps {
             let Some((next, length)) = self.step(pairs.clone(), scale) else { break };
             self = next;
@@ -174,6 +177,40 @@ pub struct EpipolarLines {
 }
 
 impl EpipolarLines {
+    /// The second view's directions in the order of their y, so that those near a line are found in a part of them.
+    pub fn by_height(&self, numbers: impl Iterator<Item = usize>) -> ByHeight {
+        let mut entries: Vec<(f64, u32)> =
+            numbers.map(|number| (self.of_second[number].0[1], number as u32)).filter(|(y, _)| y.is_finite()).collect();
+        entries.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        let of_all = |value: fn(&([f64; 2], f64, f64)) -> f64, pick: fn(f64, f64) -> f64, start: f64| {
+            entries.iter().fold(start, |most, &(_, number)| pick(most, value(&self.of_second[number as usize])))
+        };
+        ByHeight {
+            left: of_all(|second| second.0[0], f64::min, f64::INFINITY),
+            right: of_all(|second| second.0[0], f64::max, f64::NEG_INFINITY),
+            steepest: of_all(|second| second.1 + second.2, f64::max, 0.0),
+            heights: entries.iter().map(|entry| entry.0).collect(),
+            numbers: entries.iter().map(|entry| entry.1).collect(),
+        }
+    }
+
+    /// The places in that order among which all are whose squared Sampson distance from the line of a direction of the first
+    /// view is below `limit`.
+    pub fn near(&self, first: usize, order: &ByHeight, limit: f64) -> Range<usize> {
+        let p = &self.of_first[first];
+        let across = p.x * p.x + p.y * p.y;
+        // n^2 < limit (p_x^2 + p_y^2 + q_x^2 + q_y^2) with n = p_x x + p_y y + p_z, solved for y.
+        let reach = 1.001 * libm::sqrt(limit * (across + order.steepest));
+        let ends = [order.left, order.right].map(|x| -(p.x * x + p.z) / p.y);
+        let margin = reach / p.y.abs();
+        let (low, high) = (ends[0].min(ends[1]) - margin, ends[0].max(ends[1]) + margin);
+        if !(low.is_finite() && high.is_finite()) {
+            // A line straight up, or none.
+            return 0..order.heights.len();
+        }
+        order.heights.partition_point(|&y| y < low)..order.heights.partition_point(|&y| y <= high)
+    }
+
     /// The squared Sampson distance of a pair, by its numbers; NaN for a direction that is none.
     #[inline]
     pub fn squared_distance(&self, first: usize, second: usize) -> f64 {
@@ -182,6 +219,19 @@ impl EpipolarLines {
         let length = p.x * p.x + p.y * p.y + qx + qy;
         n * n / length
     }
+}
+
+/// Directions of the second view by their height.
+#[derive(Debug, Clone)]
+pub struct ByHeight {
+    /// Their numbers.
+    pub numbers: Vec<u32>,
+    heights: Vec<f64>,
+    /// The least and the largest x.
+    left: f64,
+    right: f64,
+    /// The largest squared coefficient of a line in the first view.
+    steepest: f64,
 }
 
 fn homogeneous([x, y]: [f64; 2]) -> Vector3<f64> {
@@ -250,7 +300,7 @@ pub fn relative_pose(pairs: &[Pair], threshold: f64, seed: u64) -> Option<Estima
             let rotation = known.map_or(Matrix3::identity(), |pose| pose.rotation);
             let mut pose = RelativePose { rotation, direction: start.normalize() };
             let five = || sample.iter().map(|&number| &pairs[number]);
-            pose = pose.refined(&five(), 1e3, STEPS);
+            pose = pose.refined_over(&five(), 1e3, STEPS);
             if five().any(|pair| !(pose.squared_distance(pair) < 1e-4 * limit)) {
                 continue;
             }
@@ -262,7 +312,7 @@ pub fn relative_pose(pairs: &[Pair], threshold: f64, seed: u64) -> Option<Estima
             best = Some((pose, now));
             for _ in 0..3 {
                 let inliers = inliers_of(&pose);
-                let refined = pose.refined(&inliers.iter().map(|&number| &pairs[number]), threshold, 6);
+                let refined = pose.refined_over(&inliers.iter().map(|&number| &pairs[number]), threshold, 6);
                 let least = best.map_or(f64::INFINITY, |best| best.1);
                 let lower = cost(&refined, least);
                 if lower >= least {

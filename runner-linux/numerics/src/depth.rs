@@ -64,10 +64,25 @@ impl DepthBuffer {
         };
         let (u, v) = (weight(b, c), weight(c, a));
         let inverse = [a, b, c].map(|corner| 1.0 / corner[2]);
-        let columns = range(0, self.width);
+        let whole = range(0, self.width);
+        // Where along a row a weight becomes positive or ends to be, by its slope.
+        let inverse_slopes = [-1.0 / u.0, -1.0 / v.0, 1.0 / (u.0 + v.0)];
         for y in range(1, self.height) {
             let row = y as f64;
             let (u0, v0) = (u.1 * row + u.2, v.1 * row + v.2);
+            let mut columns = whole.clone();
+            for (offset, inverse) in [u0, v0, 1.0 - u0 - v0].into_iter().zip(inverse_slopes) {
+                let edge = offset * inverse;
+                // A column more on either side, and none for slopes that are near zero: rounding decides nothing here.
+                if inverse > -1e9 && inverse < 0.0 && edge > 1.0 {
+                    columns.start = columns.start.max(edge as usize - 1);
+                } else if inverse > 0.0 && inverse < 1e9 {
+                    columns.end = columns.end.min((edge + 2.0).max(0.0) as usize);
+                }
+            }
+            if columns.start >= columns.end {
+                continue;
+            }
             let line = y * self.width;
             let (Some(depths), Some(numbers)) = (
                 self.depths.get_mut(line + columns.start..line + columns.end),

@@ -10,12 +10,12 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use rayon::prelude::*;
 
 /// `work` of each item.
-pub(crate) fn map<T: Sync, R: Send>(items: &[T], work: impl Fn(&T) -> R + Sync) -> Vec<R> {
+pub fn map<T: Sync, R: Send>(items: &[T], work: impl Fn(&T) -> R + Sync) -> Vec<R> {
     numbers(items.len(), |number| work(&items[number]))
 }
 
 /// `work` of each number below `count`.
-pub(crate) fn numbers<R: Send>(count: usize, work: impl Fn(usize) -> R + Sync) -> Vec<R> {
+pub fn numbers<R: Send>(count: usize, work: impl Fn(usize) -> R + Sync) -> Vec<R> {
     match try_numbers(count, || (), |(), number| Ok::<R, Infallible>(work(number))) {
         Ok(results) => results,
         Err(never) => match never {},
@@ -26,10 +26,7 @@ pub(crate) fn numbers<R: Send>(count: usize, work: impl Fn(usize) -> R + Sync) -
 ///
 /// # Errors
 /// That of the first item that fails; what comes after it may be left out.
-pub(crate) fn try_map<T: Sync, R: Send, E: Send>(
-    items: &[T],
-    work: impl Fn(&T) -> Result<R, E> + Sync,
-) -> Result<Vec<R>, E> {
+pub fn try_map<T: Sync, R: Send, E: Send>(items: &[T], work: impl Fn(&T) -> Result<R, E> + Sync) -> Result<Vec<R>, E> {
     try_numbers(items.len(), || (), |(), number| work(&items[number]))
 }
 
@@ -37,7 +34,7 @@ pub(crate) fn try_map<T: Sync, R: Send, E: Send>(
 ///
 /// # Errors
 /// That of the first item that fails; what comes after it may be left out.
-pub(crate) fn try_map_with<T: Sync, M: Send, R: Send, E: Send>(
+pub fn try_map_with<T: Sync, M: Send, R: Send, E: Send>(
     items: &[T],
     memory: impl Fn() -> M + Sync,
     work: impl Fn(&mut M, &T) -> Result<R, E> + Sync,
@@ -49,7 +46,7 @@ pub(crate) fn try_map_with<T: Sync, M: Send, R: Send, E: Send>(
 ///
 /// # Errors
 /// That of the lowest number that fails; what comes after it may be left out.
-pub(crate) fn try_numbers<M: Send, R: Send, E: Send>(
+pub fn try_numbers<M: Send, R: Send, E: Send>(
     count: usize,
     memory: impl Fn() -> M + Sync,
     work: impl Fn(&mut M, usize) -> Result<R, E> + Sync,
