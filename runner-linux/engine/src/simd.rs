@@ -1,7 +1,7 @@
 //! The inner loops of core, compiled again for the vector instructions that this processor turns out to have.
 //!
 //! Each function below *is* the loop of [`daymark_core::kernel`], inlined into a function with a target feature; only
-//! the three of `by_hand` are written again. A test compares all of them with the portable ones, bit for bit.
+//! the two of `by_hand` are written again. A test compares all of them with the portable ones, bit for bit.
 
 #![allow(unsafe_code, reason = "calling a function with a target feature, after asking the processor for it")]
 
@@ -107,11 +107,6 @@ macro_rules! kernels {
                 // SAFETY: as above.
                 unsafe { by_hand::$by_hand::marks_at_most(values, limit, marks) }
             }
-
-            fn distances(&self, signature: Signature, others: &[Signature], out: &mut [u8]) {
-                // SAFETY: as above.
-                unsafe { by_hand::$by_hand::distances(signature, others, out) }
-            }
         }
     };
 }
@@ -128,6 +123,7 @@ macro_rules! all_kernels {
             response_row(rows: [[&[i32]; 3]; 5], out: &mut [f32]);
             peak_flags(rows: [&[f32]; 3], least: f32, flags: &mut [u8]);
             box_sums(patch: &Patch, sums: &mut BoxSums);
+            distances(signature: Signature, others: &[Signature], out: &mut [u8]);
             count_below(values: &[u8], limit: u8) -> u32;
             closest(blocks: &[LookAlikes], search: Search) -> i32;
             nearest_three(row: &[u8], limit: u8) -> Nearest;

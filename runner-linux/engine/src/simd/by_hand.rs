@@ -1,18 +1,16 @@
-//! Three loops of core again, with instructions that the compiler does not find by itself.
+//! Two loops of core again, with instructions that the compiler does not find by itself.
 //!
 //! - `tensor_row`: 1-4-6-4-1 is 1-1 after 1-3-3-1, and one instruction adds two neighbouring products of 16 bits, for
 //!   every other column: a row of the tensor takes two thirds of the time.
 //! - `marks_at_most`: a comparison of bytes as bits of a register, without the way through memory.
-//! - `distances` (AVX-512): the bits of sixteen signatures are added in lanes of 16 bits before they change places.
 
-use daymark_core::feature::Signature;
 use daymark_core::kernel;
 
 /// Defines the module `$name` for vectors of `$bytes` bytes.
 macro_rules! by_hand {
     (
         $name:ident, $features:literal, $bytes:literal, $vector:ident, $load:ident, $store:ident, $madd:ident, $add:ident,
-        $shift:ident, $interleave:ident, $marks:ident, $distances_features:literal, $sixteen_distances:ident
+        $shift:ident, $interleave:ident, $marks:ident
     ) => {
         pub(super) mod $name {
             use super::*;
@@ -104,22 +102,6 @@ macro_rules! by_hand {
                     *last = $marks(&padded, limit) & ((1 << rest.len()) - 1);
                 }
             }
-
-            /// [`kernel::distances`].
-            #[target_feature(enable = $distances_features)]
-            pub(in super::super) fn distances(signature: Signature, others: &[Signature], out: &mut [u8]) {
-                let count = others.len().min(out.len());
-                let (sixteens, rest) = others.get(..count).unwrap_or_default().as_chunks::<16>();
-                let (slots, last) = out.as_chunks_mut::<16>();
-                for (others, slots) in sixteens.iter().zip(&mut *slots) {
-                    *slots = $sixteen_distances(signature, others);
-                }
-                let last =
-                    slots.as_flattened_mut().get_mut(16 * sixteens.len()..).unwrap_or_default().iter_mut().chain(last);
-                for (slot, &other) in last.zip(rest) {
-                    *slot = signature.distance(other) as u8;
-                }
-            }
         }
     };
 }
@@ -127,10 +109,9 @@ macro_rules! by_hand {
 use std::arch::x86_64::{
     __m256i, __m512i, _mm256_add_epi32, _mm256_cmpeq_epi8, _mm256_loadu_si256, _mm256_madd_epi16, _mm256_min_epu8,
     _mm256_movemask_epi8, _mm256_permute2x128_si256, _mm256_set1_epi8, _mm256_srai_epi32, _mm256_storeu_si256,
-    _mm256_unpackhi_epi32, _mm256_unpacklo_epi32, _mm512_add_epi16, _mm512_add_epi32, _mm512_cmple_epu8_mask,
-    _mm512_cvtepi16_epi8, _mm512_loadu_si512, _mm512_madd_epi16, _mm512_or_si512, _mm512_permutex2var_epi32,
-    _mm512_permutexvar_epi16, _mm512_popcnt_epi64, _mm512_set_epi64, _mm512_set1_epi8, _mm512_setr_epi32,
-    _mm512_shuffle_epi32, _mm512_slli_epi64, _mm512_srai_epi32, _mm512_storeu_si512, _mm512_xor_si512,
+    _mm256_unpackhi_epi32, _mm256_unpacklo_epi32, _mm512_add_epi32, _mm512_cmple_epu8_mask, _mm512_loadu_si512,
+    _mm512_madd_epi16, _mm512_permutex2var_epi32, _mm512_set1_epi8, _mm512_setr_epi32, _mm512_srai_epi32,
+    _mm512_storeu_si512,
 };
 
 by_hand!(
@@ -144,9 +125,7 @@ by_hand!(
     _mm256_add_epi32,
     _mm256_srai_epi32,
     interleave_avx2,
-    marks_avx2,
-    "avx2,popcnt",
-    sixteen_distances_avx2
+    marks_avx2
 );
 by_hand!(
     avx512,
@@ -159,9 +138,7 @@ by_hand!(
     _mm512_add_epi32,
     _mm512_srai_epi32,
     interleave_avx512,
-    marks_avx512,
-    "avx512f,avx512bw,avx512vpopcntdq,popcnt",
-    sixteen_distances_avx512
+    marks_avx512
 );
 
 #[inline]
@@ -198,43 +175,4 @@ fn marks_avx512(values: &[u8; 64], limit: u8) -> u64 {
     // SAFETY: the array has 64 bytes; the load needs no alignment.
     let values = unsafe { _mm512_loadu_si512(values.as_ptr().cast()) };
     _mm512_cmple_epu8_mask(values, _mm512_set1_epi8(limit.cast_signed()))
-}
-
-#[inline]
-#[target_feature(enable = "avx2,popcnt")]
-fn sixteen_distances_avx2(signature: Signature, others: &[Signature; 16]) -> [u8; 16] {
-    others.map(|other| signature.distance(other) as u8)
-}
-
-#[inline]
-#[target_feature(enable = "avx512f,avx512bw,avx512vpopcntdq")]
-fn sixteen_distances_avx512(Signature([low, high]): Signature, others: &[Signature; 16]) -> [u8; 16] {
-    let (low, high) = (low.cast_signed(), high.cast_signed());
-    let signature = _mm512_set_epi64(high, low, high, low, high, low, high, low);
-    // Bits of each half of four signatures, in the lowest of four lanes of 16 bits.
-    let four = |start: usize| {
-        // SAFETY: 64 bytes from 0, 64, 128 or 192 on lie within the array's 256; a signature is two words in order, and the
-        // load needs no alignment.
-        let others = unsafe { _mm512_loadu_si512(others.as_ptr().cast::<u64>().add(2 * start).cast()) };
-        _mm512_popcnt_epi64(_mm512_xor_si512(others, signature))
-    };
-    let pair = |a, b| _mm512_or_si512(a, _mm512_slli_epi64::<16>(b));
-    let halves = _mm512_or_si512(pair(four(0), four(4)), _mm512_slli_epi64::<32>(pair(four(8), four(12))));
-    // Both halves of a lane of 128 bits have the sum; lane i has signatures i, 4 + i, 8 + i, 12 + i.
-    let sums = _mm512_add_epi16(halves, _mm512_shuffle_epi32::<0x4E>(halves));
-    let order = _mm512_set_epi64(
-        0,
-        0,
-        0,
-        0,
-        0x001B_0013_000B_0003,
-        0x001A_0012_000A_0002,
-        0x0019_0011_0009_0001,
-        0x0018_0010_0008_0000,
-    );
-    let bytes = _mm512_cvtepi16_epi8(_mm512_permutexvar_epi16(order, sums));
-    let mut all = [0; 32];
-    // SAFETY: the array has 32 bytes; the store needs no alignment.
-    unsafe { _mm256_storeu_si256(all.as_mut_ptr().cast(), bytes) };
-    *all.first_chunk().unwrap_or(&[0; 16])
 }
