@@ -480,6 +480,36 @@ mod tests {
     }
 
     #[test]
+    fn all_that_lies_on_a_line_is_in_its_part_of_the_heights() {
+        // Sideways, upwards, forwards and between: level, upright and radial lines.
+        let directions = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [3.0, 0.2, 0.8], [-0.3, 2.0, 1.0]];
+        for motion in directions.map(Vector3::from) {
+            let (pairs, rotation) = scene(motion, false, 3);
+            let (first, mut second): (Vec<_>, Vec<_>) = pairs.iter().map(|pair| (pair[0], pair[1])).unzip();
+            // One that has no direction is on no line.
+            second[7] = [f64::NAN; 2];
+            let lines = RelativePose { rotation, direction: motion.normalize() }.lines(&first, &second);
+            let order = lines.by_height((0..second.len()).filter(|number| number % 5 != 0));
+            for limit in [1e-7, 1e-5, 1e-3] {
+                let (mut on_lines, mut looked_at) = (0, 0);
+                for a in 0..first.len() {
+                    let part = lines.near(a, &order, limit);
+                    looked_at += part.len();
+                    for (place, &b) in order.numbers.iter().enumerate() {
+                        if lines.squared_distance(a, b as usize) < limit {
+                            on_lines += 1;
+                            assert!(part.contains(&place), "{motion}, line {a}, direction {b}, limit {limit}");
+                        }
+                    }
+                }
+                assert!(on_lines > 100 && looked_at <= first.len() * order.numbers.len());
+                // Level lines meet few heights.
+                assert!(motion.y != 0.0 || motion.z != 0.0 || limit > 1e-5 || looked_at < 10_000, "{looked_at}");
+            }
+        }
+    }
+
+    #[test]
     fn too_few_pairs_have_no_pose() {
         assert_eq!(relative_pose(&[[[0.0; 2]; 2]; 7], 0.001, 1), None);
     }
