@@ -23,7 +23,7 @@ use crate::table_file::{OwnedTable, TableFileError, open_table, read_table, repl
 
 /// Arguments of `daymark enroll`.
 #[derive(Debug, clap::Args)]
-#[allow(clippy::struct_excessive_bools, reason = "each is a flag")]
+#[expect(clippy::struct_excessive_bools, reason = "each is a flag")]
 #[command(after_help = "\
 A manifest names buildings and their pictures, paths relative to the manifest:
 

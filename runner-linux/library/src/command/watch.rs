@@ -28,7 +28,7 @@ use crate::watch::table::{LiveTable, Reloader};
 
 /// Arguments of `daymark watch`.
 #[derive(Debug, clap::Args)]
-#[allow(clippy::struct_excessive_bools, reason = "each is a flag")]
+#[expect(clippy::struct_excessive_bools, reason = "each is a flag")]
 #[command(
     group(clap::ArgGroup::new("source").required(true).args(["camera", "input", "frames", "list"])),
     after_help = "Exit codes: 0 some answer was given, or it was asked to stop; 1 the frames ended without an answer; 2 an \

@@ -234,7 +234,7 @@ impl FrameSource for Open {
 }
 
 impl Drop for Open {
-    #[allow(unsafe_code, reason = "the stream's own drop would panic")]
+    #[expect(unsafe_code, reason = "the stream's own drop would panic")]
     fn drop(&mut self) {
         let stopped = self.stream.stop();
         let gone = |error: &io::Error| error.raw_os_error() == Some(rustix::io::Errno::NODEV.raw_os_error());
