@@ -255,15 +255,19 @@ fn is_right(seen: &Seen) -> bool {
 fn tell_ending(args: &Args, seen: &[Seen]) -> io::Result<()> {
     let right = seen.iter().filter(|seen| is_right(seen)).count();
     let page = args.out.join("index.html");
+    // As it was called: `cargo run` calls it by its place, which nobody has seen yet.
+    let program = std::env::args_os().next().map_or_else(|| "daymark".into(), PathBuf::from);
     let frame = args.out.join(seen.first().map_or("", |seen| seen.frame_file.as_str()));
     say(&format!(
         "{right} of {} as it should be. What to notice:\n   \
          - Every name comes with the probability that it is false, which counts how many views were compared.\n   \
          - \"Unknown\" is an answer: above 1 % there is no name (--max-false-answer changes that).\n   \
          - No training, no network: a building is known from two pictures on.\n   \
-         - Look at {} to see which corners decided.\n",
+         - Look at {} to see which corners decided.\n   \
+         - This program is {}: put it into your path, or write that for `daymark` below.\n",
         seen.len(),
         page.display(),
+        program.display(),
     ))?;
     say("Now you:")?;
     say(&format!(
